@@ -219,7 +219,7 @@ class SceneReader {
     if (!is_read || !morph(*text)) {
       return false;
     }
-    const std::vector<Error> unfit = misfits(scene_.network, scene_.preset);
+    const std::vector<Error> unfit = find_preset_errors(scene_.network, scene_.preset);
     for (const Error& error : unfit) {
       fail(scene_.path, *text, error);
     }

@@ -5,13 +5,15 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/compile/prove.h"
+#include "core/compile/tune.h"
 #include "core/model/preset/fit.h"
 #include "core/model/topology.h"
 
 namespace ressort::compile {
 namespace {
 
-// Of what fits the network.
+// The setting must fit the network.
 Control make_control(const Network& network, const ControlSetting& setting) {
   static constexpr Source sources[] = {Source::note, Source::controller, Source::pressure,
                                        Source::custom, Source::audio};
@@ -77,7 +79,7 @@ InputInfo input_info(const Network& network, std::size_t index,
   return info;
 }
 
-// The highest audio channel that a control or a parameter listens to.
+// Returns the highest audio channel that a control or a parameter listens to.
 int audio_input_count(const Network& network, const Preset& preset) {
   int count = 0;
   for (const ControlSetting& setting : preset.controls) {
@@ -89,8 +91,8 @@ int audio_input_count(const Network& network, const Preset& preset) {
   return count;
 }
 
-// As hard as the preset strikes; if it does not, what moves all masses together so far, at the
-// pitch of the lowest mode, that the output is at half its full scale.
+// Returns the force of a hard strike: the preset's largest impulse or, without one, the impulse
+// that brings the output of all masses, moving together at this frequency, to half of full scale.
 double find_blow(const Network& network, const std::vector<Control>& controls, double frequency_hz,
                  double gain) {
   double blow = 0.0;
@@ -104,14 +106,14 @@ double find_blow(const Network& network, const std::vector<Control>& controls, d
   }
   const std::vector<double> parameters = parameter_values(network);
   double mass = 0.0;
-  double modal_mass = 0.0;  // each mode of a body has all of it
+  double modal_mass = 0.0;  // of a body: each of its modes has this mass
   for (const Mass& of : network.masses) {
     const double here = moves(of) ? argument_value(network, of.mass, parameters) : 0.0;
     modal_mass = of.is_mode ? std::max(modal_mass, here) : modal_mass;
     mass += of.is_mode ? 0.0 : here;
   }
   mass += modal_mass;
-  for (const Macro& guide : network.waveguides) {  // R of each sample of its length
+  for (const Macro& guide : network.waveguides) {  // impedance R per sample of the length
     mass += argument_value(network, guide.impedance, parameters) * Network::reference_rate_hz /
             2.0 / std::max(1.0, argument_value(network, guide.frequency_hz, parameters));
   }
@@ -119,7 +121,7 @@ double find_blow(const Network& network, const std::vector<Control>& controls, d
   return gain > 0.0 ? 0.5 * mass * turn / gain : mass * turn;
 }
 
-// With a point, which the number of a mass has not.
+// Returns a coordinate with a decimal point, unlike the number of a node.
 std::string coordinate_text(double value) {
   char text[32];
   const auto end = std::to_chars(text, text + sizeof text, value, std::chars_format::general, 4);
@@ -183,7 +185,7 @@ std::vector<StruckInfo> find_struck(const Network& network, const Machine& machi
   }
   const auto is_before = [](const StruckInfo& a, const StruckInfo& b) { return a.name < b.name; };
   std::stable_sort(struck.begin(), struck.end(), is_before);
-  // Several ends of links may be at one place.
+  // Several links may end at one place.
   const auto same = [](const StruckInfo& a, const StruckInfo& b) { return a.name == b.name; };
   struck.erase(std::unique(struck.begin(), struck.end(), same), struck.end());
   return struck;
@@ -197,7 +199,7 @@ bool has_swings(const Preset& preset) {
 Preset without_swings(Preset preset) {
   std::erase_if(preset.controls, [](const ControlSetting& control) { return control.in_swings; });
   for (ControlSetting& control : preset.controls) {
-    control.has_level = false;  // which is of the sound, and moves nothing
+    control.has_level = false;  // a level scales the sound only
   }
   preset.gain = 1.0;
   return preset;
@@ -217,8 +219,8 @@ Preset in_positions(Preset preset, const Network& network, double swing) {
   return preset;
 }
 
-Playing make_playing(const Network& network, const Preset& preset, const Analysis& analysis,
-                     bool bare, int voices, double gain) {
+Playing make_playing(const Network& network, const Preset& preset, const Proof& proof,
+                     const TunedKeys& keys, bool bare, int voices, double gain) {
   return {
       .voices = voices,
       .gain = gain,
@@ -227,7 +229,7 @@ Playing make_playing(const Network& network, const Preset& preset, const Analysi
       .decay_s = preset.decay_s,
       .keys_db = preset.keys_db,
       .noise = preset.noise,
-      .tuning = analysis.mode ? Tuning::keyboard : Tuning::fixed,
+      .tuning = keys.mode ? Tuning::keyboard : Tuning::fixed,
       .transpose = static_cast<double>(preset.transpose),
       .keys_hz = make_keys(preset),
       .velocity = {.points = preset.velocity_points, .exponent = std::exp2(-2.0 * preset.velocity)},
@@ -235,18 +237,18 @@ Playing make_playing(const Network& network, const Preset& preset, const Analysi
       .mono = preset.mono,
       .legato = preset.legato,
       .glide_s = preset.glide_s,
-      .pitches = analysis.pitches,
-      .along = analysis.along,
-      .highest_factor = analysis.margins.keys,
-      .home = analysis.margins.home,
-      .away = analysis.margins.away,
+      .pitches = keys.pitches,
+      .along = keys.along,
+      .highest_factor = keys.highest_factor,
+      .home = proof.margins.home,
+      .away = keys.away,
       .controls = make_controls(network, preset),
-      .limits = analysis.stability.limits,
-      .rest_bounds = analysis.rest_bounds};
+      .limits = proof.stability.limits,
+      .rest_bounds = proof.rest_bounds};
 }
 
-Instrument make_instrument(const Network& network, const Preset& preset, const Analysis& analysis,
-                           int voices, double gain) {
+Instrument make_instrument(const Network& network, const Preset& preset, const Proof& proof,
+                           const TunedKeys& keys, int voices, double gain) {
   const std::vector<Control> controls = make_controls(network, preset);
   std::vector<InputInfo> inputs;
   for (std::size_t i = 0; i < network.inputs.size(); ++i) {
@@ -258,12 +260,8 @@ Instrument make_instrument(const Network& network, const Preset& preset, const A
       custom.push_back({preset.controls[i].address, static_cast<int>(i)});
     }
   }
-  std::optional<Mode> mode = analysis.mode;
-  if (mode) {
-    mode->frequency_hz = analysis.pitches.frequency_at(1.0);
-  }
-  const double most = std::max(1.0, analysis.margins.keys);  // of a mode's stiffness
-  return {.parameters = analysis.stability.parameters,
+  const std::optional<Mode>& mode = keys.mode;
+  return {.parameters = proof.stability.parameters,
           .inputs = std::move(inputs),
           .custom = std::move(custom),
           .blow = find_blow(network, controls, mode ? mode->frequency_hz : 220.0, gain),
@@ -277,9 +275,10 @@ Instrument make_instrument(const Network& network, const Preset& preset, const A
           .a4_hz = preset.a4_hz,
           .channel = static_cast<std::uint8_t>(std::countr_zero(preset.channels)),
           .mode = mode,
-          .highest_frequency_hz = mode ? analysis.pitches.frequency_at(most) : 0.0,
-          .stiffness_margin = analysis.margins.whole,
-          .verdict = analysis.stability.verdict};
+          .highest_frequency_hz =
+              mode ? keys.pitches.frequency_at(std::max(1.0, keys.highest_factor)) : 0.0,
+          .stiffness_margin = proof.margins.whole,
+          .verdict = proof.stability.verdict};
 }
 
 }  // namespace ressort::compile

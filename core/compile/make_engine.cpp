@@ -28,18 +28,18 @@ std::uint64_t engine_bytes(const Machine& machine, int voices, Precision precisi
                            const Executor* executor) {
   const std::uint64_t number_bytes =
       precision == Precision::float32 ? sizeof(float) : sizeof(double);
-  constexpr std::uint64_t of_any_engine = 131'072;  // MIDI channels, tunings, the mix
+  constexpr std::uint64_t fixed_bytes = 131'072;  // MIDI channels, tunings, the mix
   std::uint64_t bytes = 0;
   for (const Program& program : machine.parts) {
     bytes += voice_bytes(program, number_bytes);
   }
-  // What is played, a helper's copy, and where a late one's work is done.
+  // With live helpers: the voices, a helper's copy, and a spare one for tasks of a late helper.
   const std::uint64_t places = executor != nullptr && executor->is_live() ? 3 : 1;
-  return of_any_engine + places * bytes * lane_count(voices);
+  return fixed_bytes + places * bytes * lane_count(voices);
 }
 
-std::optional<Error> shortage(const Machine& machine, int voices, Precision precision,
-                              const Executor* executor, std::uint64_t most_bytes) {
+std::optional<Error> check_memory(const Machine& machine, int voices, Precision precision,
+                                  const Executor* executor, std::uint64_t most_bytes) {
   const auto bytes_of = [&](int count) {
     return engine_bytes(machine, count, precision, executor);
   };

@@ -1,4 +1,4 @@
-// core/compile: from a machine in its forms to an engine that sounds.
+// core/compile: the stages that check the memory, find the gain and make the engine.
 #pragma once
 
 #include <cstdint>
@@ -11,29 +11,27 @@
 
 namespace ressort::compile {
 
-// About as many bytes as an engine of this machine, in its forms, takes with so many voices; within
-// a factor of two where that is much. Helpers that nobody waits for have copies. O(parts). [any
-// thread]
+// Estimates the memory of an engine with this number of voices, in bytes, within a factor of two
+// for large engines. Live helper threads work on copies. O(parts). [any thread]
 std::uint64_t engine_bytes(const Machine& machine, int voices, Precision precision,
                            const Executor* executor);
 
-// What to say where they do not fit into `most_bytes`, and how many would. Asked before the memory
-// is taken: afterwards it would be too late. [any thread]
-std::optional<Error> shortage(const Machine& machine, int voices, Precision precision,
-                              const Executor* executor, std::uint64_t most_bytes);
+// Returns an error if the engine would not fit into `most_bytes`; it names the number of voices
+// that would. Called before the memory is allocated. [any thread]
+std::optional<Error> check_memory(const Machine& machine, int voices, Precision precision,
+                                  const Executor* executor, std::uint64_t most_bytes);
 
-// What a loud note peaks at by the gain that find_gain() finds.
+// Peak of a loud note at the gain that find_gain() returns: -6 dBFS.
 inline constexpr double found_gain_peak = 0.5;
 
-// The gain at which a forte note peaks at -6 dBFS, found by playing one: what a model that comes
-// without a preset is played with. `playing`: by one voice at gain 1. 1 where notes excite nothing.
-// Bounded to about 4 million steps of a mass; nothing where even the beginning of a note might take
-// seconds. [any thread but audio]
+// Plays a forte note and returns the gain at which it peaks at -6 dBFS. `playing`: one voice at
+// gain
+// 1. Returns 1 if the note makes no sound. Plays about 4 million steps of a mass; returns nothing
+// if even the first 50 ms could take seconds. [any thread but audio]
 std::optional<double> find_gain(const Machine& machine, const Playing& playing, Precision precision,
                                 Isa isa, const Progress& progress);
 
-// At its gain, what is below -120 dBFS may sleep whatever else sounds. O(voices * elements) in time
-// and memory. [any thread but audio]
+// O(voices * elements) in time and memory. [any thread but audio]
 std::unique_ptr<Engine> make_engine(Machine machine, Playing playing, Precision precision, Isa isa,
                                     const Progress& progress, Executor* executor);
 

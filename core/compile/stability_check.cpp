@@ -428,7 +428,8 @@ double inside_limit(double limit, bool is_upper) {
   return value;
 }
 
-std::vector<ParameterInfo> asked_ranges(const Network& network, const Preset& preset, bool bare) {
+std::vector<ParameterInfo> requested_ranges(const Network& network, const Preset& preset,
+                                            bool bare) {
   std::vector<ParameterInfo> infos;
   for (const Parameter& parameter : network.parameters) {
     const double reach = bare                     ? std::numeric_limits<double>::max()

@@ -41,7 +41,8 @@ struct Setting {
 
 // What the parameters may be turned to: the preset's ranges; without one, a generous one. The bare
 // network is research: there anything goes. Of a preset that fits and a network without macros.
-std::vector<ParameterInfo> asked_ranges(const Network& network, const Preset& preset, bool bare);
+std::vector<ParameterInfo> requested_ranges(const Network& network, const Preset& preset,
+                                            bool bare);
 
 // Where they start, the bare network's at the settings.
 std::vector<double> start_values(const std::vector<ParameterInfo>& parameters,
@@ -55,7 +56,7 @@ struct StabilityRequest {
   const Network& written;   // to name what is to blame
   const Network& expanded;  // the same without macros
   const Preset& preset;
-  const std::vector<ParameterInfo>& parameters;  // as asked_ranges() says
+  const std::vector<ParameterInfo>& parameters;  // as requested_ranges() says
   std::span<const LinkScheme> schemes;           // [link] how forces are found; empty: as published
   std::span<const double> start;                 // [parameter] as start_values() says
   double rate_hz = 44100.0;

@@ -12,7 +12,7 @@
 namespace ressort::model {
 namespace {
 
-// Looks at the arguments of one element after the other, for no_number().
+// Looks at the arguments of one element after the other, for find_invalid_number().
 class NumberCheck {
  public:
   NumberCheck(const Network& network, std::span<const double> parameters, double rate_ratio)
@@ -147,7 +147,7 @@ class NumberCheck {
 
 }  // namespace
 
-std::optional<Error> no_number(const Network& network, std::span<const double> parameters,
+std::optional<Error> find_invalid_number(const Network& network, std::span<const double> parameters,
                                double rate_ratio) {
   return NumberCheck(network, parameters, rate_ratio).run();
 }

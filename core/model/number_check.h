@@ -12,7 +12,7 @@ namespace ressort::model {
 // The first element, in the order of the network, of which an argument is no finite number with
 // these values of the parameters, or which weighs nothing; with its line. What an audio input gives
 // is not looked at. O(n). [any thread but audio]
-std::optional<Error> no_number(const Network& network, std::span<const double> parameters,
+std::optional<Error> find_invalid_number(const Network& network, std::span<const double> parameters,
                                double rate_ratio);
 
 }  // namespace ressort::model

@@ -156,8 +156,9 @@ class EnginePlayer : public Player {
     if (const auto shapes = scene.voices > 1 ? lowest_shapes(network, machine.parameters)
                                              : std::optional<LowestShapes>()) {
       playing.tuning = Tuning::keyboard;
-      playing.pitches = make_pitches(*shapes, stepping_of_lowest(machine, *shapes), machine.rate_hz,
-                                     machine.rate_ratio);
+      playing.pitches =
+          make_pitches(*shapes, stepping_of_lowest(machine, *shapes, machine.parameters),
+                       machine.rate_hz, machine.rate_ratio);
       playing.highest_factor = 4.0;
     }
     return playing;

@@ -472,24 +472,6 @@ TEST_CASE("springs that bend keep a budget of pitch while they hardly move", "[a
   CHECK(std::fabs(off_cents(heard_hz(0.1, fine), sharp_hz)) < 10.0);
 }
 
-TEST_CASE("what merging costs counts", "[accuracy]") {
-  // Two springs in series of 0.05 and 0.04 with 0.003 between them, from 1 to ground.
-  const std::string text =
-      "@g ground 0.\n@a mass 1. 0. 0.\n@l mass 0.003 0. 0.\n@s springDamper @g @l 0.05 0.\n"
-      "@t springDamper @l @a 0.04 0.\n@in1 frcInput @a\n@out1 posOutput @a\n";
-  Preset preset = support::struck(1);
-  preset.keyboard = false;
-  const Plan plan = plan_of(text, preset, {.cents = 5.0});
-  REQUIRE(plan.accuracy);
-  // det(K - w M) = 0 with K = {{0.09, -0.04}, {-0.04, 0.04}}, M = {0.003, 1}
-  const double b = 0.09 + 0.003 * 0.04;
-  const double whole = (b - std::sqrt(b * b - 4.0 * 0.003 * 0.002)) / (2.0 * 0.003);
-  const double merged = 0.05 * 0.04 / 0.09;
-  const double by_merging = 600.0 * std::log2(merged / whole);
-  CHECK(by_merging > 0.1);
-  CHECK(plan.accuracy->cents == Approx(by_merging + cents_of(merged)).epsilon(1e-6));
-}
-
 TEST_CASE("what nobody knows is not said to be kept", "[accuracy]") {
   // One damper more on a mesh: damping is not proportional, and there are too many masses.
   const std::string mesh =

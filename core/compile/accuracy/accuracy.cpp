@@ -320,44 +320,4 @@ Accuracy Judge::of_bodies(std::size_t corner, const Stepping& stepping) {
       program_.rate_hz, 0);
 }
 
-Accuracy merging_accuracy(const Machine& written, const Machine& merged, std::size_t most_masses,
-                          const Progress& progress) {
-  const auto poles_of = [&](const Machine& machine, std::size_t& masses) -> std::optional<Poles> {
-    Poles poles;
-    for (const Program& program : machine.parts) {
-      const std::size_t n = program.moving;
-      masses += n;
-      if (n > most_masses) {
-        return std::nullopt;
-      }
-      progress.spend(n * n);
-      const Springs springs = springs_of(program, machine.parameters, 1.0);
-      if (!springs.is_sound) {
-        return std::nullopt;
-      }
-      if (const auto modes = modes_of(springs)) {
-        for (const auto& [stiffness, damping] : *modes) {
-          if (const auto pole = continuous_pole(stiffness, damping)) {
-            poles.push_back(*pole);
-          }
-        }
-      } else if (n > most_coupled_masses) {
-        return std::nullopt;
-      } else {
-        progress.spend(8 * n * n * n);
-        const Poles coupled = continuous_poles(springs);
-        poles.insert(poles.end(), coupled.begin(), coupled.end());
-      }
-    }
-    return poles;
-  };
-  std::size_t before = 0;
-  std::size_t after = 0;
-  const auto wanted = poles_of(written, before);
-  const auto found = poles_of(merged, after);
-  return wanted && found
-             ? compare(*wanted, *wanted, *found, written.rate_hz, before - std::min(before, after))
-             : unknown();
-}
-
 }  // namespace ressort::compile

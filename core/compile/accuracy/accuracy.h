@@ -90,9 +90,4 @@ class Judge {
   std::vector<std::optional<Course>> courses_;  // [corner]
 };
 
-// What became of the continuous network's partials as elements were merged, at where it starts: the
-// partials of masses that are no more are left out. Not known where there are too many masses.
-Accuracy merging_accuracy(const Machine& written, const Machine& merged, std::size_t most_masses,
-                          const Progress& progress = {});
-
 }  // namespace ressort::compile

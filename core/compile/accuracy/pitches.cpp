@@ -191,7 +191,8 @@ Pitches make_pitches(const LowestShapes& shapes, const Stepping& stepping, doubl
   return make_pitches(mode, rate_hz);
 }
 
-Stepping stepping_of_lowest(const Machine& machine, const LowestShapes& shapes) {
+Stepping stepping_of_lowest(const Machine& machine, const LowestShapes& shapes,
+                            std::span<const double> parameters) {
   constexpr double alone = 0.999;  // what ties it to other masses hardly matters
   if (shapes.share_of_modes > alone) {
     return {Stepping::Scheme::exact};
@@ -210,7 +211,7 @@ Stepping stepping_of_lowest(const Machine& machine, const LowestShapes& shapes) 
     if (is_alike || machine.parts.size() == 1 || program.moving > most_sought) {
       continue;
     }
-    const Springs springs = springs_of(program, machine.parameters, 1.0);
+    const Springs springs = springs_of(program, parameters, 1.0);
     for (const double stiffness : symmetric_eigenpairs(springs.stiffness).values) {
       const double off = std::fabs(stiffness / wanted - 1.0);
       if (off < same_mode && off < nearest) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <complex>
+#include <span>
 
 #include "core/analysis/linear.h"
 #include "core/compile/accuracy/stepping.h"
@@ -36,6 +37,7 @@ Pitches make_pitches(const LowestShapes& shapes, const Stepping& stepping, doubl
                      double rate_ratio);
 
 // How the part of a machine steps that the lowest mode is in; that of a body is exact everywhere.
-Stepping stepping_of_lowest(const Machine& machine, const LowestShapes& shapes);
+Stepping stepping_of_lowest(const Machine& machine, const LowestShapes& shapes,
+                            std::span<const double> parameters);
 
 }  // namespace ressort::compile

@@ -132,7 +132,7 @@ Network with_fixed(Network network, const Preset& preset) {
   return network;
 }
 
-std::vector<Error> misfits(const Network& network, const Preset& preset) {
+std::vector<Error> find_preset_errors(const Network& network, const Preset& preset) {
   std::vector<Error> found;
   Network marked = preset.fixed.empty() ? Network() : network;
   for (const std::string& label : preset.fixed) {

@@ -36,7 +36,7 @@ Network heard_where_touched(Network network, const Preset& preset);
 
 // All that the preset names and the network does not have or cannot do, in the order of the
 // preset's lines. [any thread but audio]
-std::vector<Error> misfits(const Network& network, const Preset& preset);
+std::vector<Error> find_preset_errors(const Network& network, const Preset& preset);
 
 // The network with what the preset says is fixed marked so. O(elements) [any thread but audio]
 Network with_fixed(Network network, const Preset& preset);

@@ -82,7 +82,7 @@ TEST_CASE("a box that is fixed rings at its own modes under every key", "[fixed]
 }
 
 TEST_CASE("a label that the model does not have cannot be fixed", "[fixed]") {
-  const std::vector<Error> found = misfits(network_of(guitar), preset_of("fixed = [\"bix\"]\n"));
+  const std::vector<Error> found = find_preset_errors(network_of(guitar), preset_of("fixed = [\"bix\"]\n"));
   REQUIRE(found.size() == 1);
   CHECK(found[0].message == "the model has nothing labelled 'bix' that keys could leave");
 }

@@ -111,8 +111,8 @@ void check_preset(const std::string& name, double rate_hz, int step) {
   const Machine& machine = compiled->engine->machine();
   const auto shapes = lowest_shapes(expand_macros(scene->network), machine.parameters);
   REQUIRE(shapes);
-  const Pitches pitches =
-      make_pitches(*shapes, stepping_of_lowest(machine, *shapes), rate_hz, ratio);
+  const Pitches pitches = make_pitches(
+      *shapes, stepping_of_lowest(machine, *shapes, machine.parameters), rate_hz, ratio);
   double worst = 0.0;
   for (int key = 24; key <= 108; key += step) {
     const double hz = hz_of(key, scene->preset.transpose);

@@ -1,7 +1,7 @@
-// What need not be computed: what no output hears, what is as good as one.
+// Culling of masses that no output hears, and merging of parallel springs.
+#include "core/compile/reduce.h"
 #include "core/analysis/linear.h"
 #include "core/compile/cull.h"
-#include "core/compile/merge.h"
 #include "core/model/topology.h"
 #include "tests/support/comparison.h"
 #include "tests/support/networks/random_network.h"
@@ -58,7 +58,7 @@ std::string unheard(Random& random) {
 
 }  // namespace
 
-TEST_CASE("what is left out changes no bit of any output, on 200 random networks", "[reduce]") {
+TEST_CASE("Culling changes no bit of any output of 200 random networks", "[reduce]") {
   std::size_t left_out = 0;
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     INFO("seed " << seed);
@@ -85,7 +85,7 @@ TEST_CASE("what is left out changes no bit of any output, on 200 random networks
   CHECK(left_out > 400);
 }
 
-TEST_CASE("a mass is left out if nobody hears it", "[reduce]") {
+TEST_CASE("A mass that no output hears is left out", "[reduce]") {
   const auto said = [](const std::string& text) { return describe(cull(network_of(text))); };
   const std::string pair =
       "@g ground 0.\n@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n@s springDamper @a @b .1 0.\n"
@@ -107,7 +107,7 @@ TEST_CASE("a mass is left out if nobody hears it", "[reduce]") {
         "1 mass that no output hears, 1 link that exerts nothing");
 }
 
-TEST_CASE("springs side by side are one", "[reduce]") {
+TEST_CASE("Parallel springs are merged into one", "[reduce]") {
   const std::string one =
       "@g ground 0.\n@k param .03\n@m mass 1. .5 .5\n@out1 posOutput @m\n"
       "@a springDamper @m @g [.05+k] .003\n";
@@ -115,11 +115,10 @@ TEST_CASE("springs side by side are one", "[reduce]") {
       "@g ground 0.\n@k param .03\n@m mass 1. .5 .5\n@out1 posOutput @m\n"
       "@a springDamper @m @g .05 .001\n@b springDamper @g @m [1*k] .001\n@c springDamper @m @g 0. "
       ".001\n";
-  const auto merged = merge(network_of(three), {});
-  REQUIRE(merged);
-  CHECK(merged->parallel == 2);
-  CHECK(describe(*merged) == "2 springs beside others");
-  CHECK_FALSE(merge(network_of(one), {}));
+  CHECK(merge_parallel_springs(network_of(three)).merged_springs == 2);
+  const Reduced unchanged = merge_parallel_springs(network_of(one));
+  CHECK(unchanged.merged_springs == 0);
+  CHECK(unchanged.network == network_of(one));
   const auto play = [](const std::string& text) {
     support::Player player(text, {}, {.method = Method::direct});
     player.run(20'000);
@@ -134,58 +133,17 @@ TEST_CASE("springs side by side are one", "[reduce]") {
   }
   CHECK(comparison.peak > 0.1);
   CHECK(comparison.relative() < 1e-11);  // rounding, over 40 000 samples
-  CHECK(second.compiled.plan.notes == std::vector<std::string>{"merged: 2 springs beside others"});
+  CHECK(second.compiled.plan.notes == std::vector<std::string>{"merged: 2 parallel springs"});
 }
 
-// A ground, a spring, a light mass, a spring, a mass of 1: by hand. The light mass moves
-// by w = k2/(k1 + k2) of the other, which its inertia makes heavier by m w^2.
-TEST_CASE("springs without a damper are merged as well", "[reduce]") {
+TEST_CASE("Parallel springs without dampers are merged", "[reduce]") {
   const Network network = network_of(
       "@s stiffString 5 1. .1 .02 .01 0. 0. 0.\n@t springDamper [@s .5] [@s .5] .1 0.\n@out1 "
       "posOutput [@s .5]\n");
   const Network expanded = expand_macros(network);
   Network twice = expanded;
   twice.links.insert(twice.links.end(), expanded.links.begin(), expanded.links.end());
-  const auto merged = merge(twice, {});
-  REQUIRE(merged);
-  CHECK(merged->parallel >= expanded.links.size() - 1);
-}
-
-TEST_CASE("a light mass between springs weighs as little as is said", "[reduce]") {
-  const double k1 = .0008;
-  const double k2 = .0012;
-  const double m = 1e-3;
-  const auto text = [&](const std::string& heard) {
-    return "@g ground 0.\n@l mass " + show(m) + " 0. 0.\n@m mass 1. 0. 0.\n" +
-           "@a springDamper @g @l " + show(k1) + " 0.\n@b springDamper @l @m " + show(k2) +
-           " 0.\n@out1 posOutput @" + heard + "\n@in1 frcInput @m\n";
-  };
-  const Network network = network_of(text("m"));
-  CHECK_FALSE(merge(network, {}));                            // nobody asked
-  CHECK_FALSE(merge(network, {.cents = 0.5}));                // 1e-3 * 0.6 / 2 is 0.52 cents
-  CHECK_FALSE(merge(network_of(text("l")), {.cents = 5.0}));  // it is heard itself
-  const auto merged = merge(network, {.cents = 1.0});
-  REQUIRE(merged);
-  CHECK(merged->series == 1);
-  CHECK(describe(*merged) == "1 light mass between springs (0.52 cents at most)");
-  const double with = lowest_mode(network, {})->frequency_hz;
-  const double without = lowest_mode(merged->network, {})->frequency_hz;
-  const double w = k2 / (k1 + k2);
-  const double expected = m * w * w / 2.0;
-  CHECK((without - with) / with == Approx(expected).epsilon(0.02));
-  CHECK(1200.0 * std::log2(without / with) < merged->cents);
-}
-
-TEST_CASE("a mass too light for its springs is merged before it explodes", "[reduce]") {
-  const std::string text =
-      "@g ground 0.\n@l mass .002 0. 0.\n@m mass 1. 0. 0.\n@a springDamper @g @l .004 0.\n"
-      "@b springDamper @l @m .005 0.\n@out1 posOutput @m\n@in1 frcInput @m\n";
-  const Network network = network_of(text);
-  const auto merged = merge(network, {});
-  REQUIRE(merged);
-  CHECK(merged->series == 1);
-  CHECK(merged->cents < forced_cents);
-  CHECK(lowest_mode(merged->network, {})->stiffness == Approx(.004 * .005 / .009).epsilon(1e-12));
+  CHECK(merge_parallel_springs(twice).merged_springs >= expanded.links.size() - 1);
 }
 
 }  // namespace ressort::reduce_test

@@ -3,8 +3,9 @@
 #include "core/compile/accuracy/pitches.h"
 #include "core/compile/instrument.h"
 #include "core/compile/make_engine.h"
-#include "core/compile/rest_bound.h"
+#include "core/compile/prove.h"
 #include "core/compile/schemes.h"
+#include "core/compile/tune.h"
 #include "core/model/number_check.h"
 #include "tests/support/player.h"
 
@@ -30,7 +31,7 @@ TEST_CASE("without a preset a parameter may be turned to four times its value", 
   const Network network = network_of(
       "@a param 0.3\n@b param -2\n@c param 0\n@M param 8\n@g ground 0.\n@o osc M a b 0. 0.\n@s "
       "spring @g @o c\n@out1 posOutput @o\n");
-  const auto asked = asked_ranges(network, Preset{}, false);
+  const auto asked = requested_ranges(network, Preset{}, false);
   const auto range = [&](std::size_t i) { return std::pair(asked[i].minimum, asked[i].maximum); };
   CHECK(range(0) == std::pair(0.0, 1.2));
   CHECK(range(1) == std::pair(-8.0, 8.0));
@@ -42,21 +43,21 @@ TEST_CASE("without a preset a parameter may be turned to four times its value", 
 
 TEST_CASE("a formula that is no number is told where it stands", "[stages]") {
   const Network network = network_of("@P param 1\n@o osc 1. 1/P 0. 0. 0.\n@out1 posOutput @o\n");
-  CHECK_FALSE(no_number(network, std::vector{1.0}, 1.0));
-  const auto error = no_number(network, std::vector{0.0}, 1.0);
+  CHECK_FALSE(find_invalid_number(network, std::vector{1.0}, 1.0));
+  const auto error = find_invalid_number(network, std::vector{0.0}, 1.0);
   REQUIRE(error);
   CHECK(error->message == "the stiffness 1/P of 'o' is no finite number where P = 0");
   CHECK(error->line == 2);
   // At half the rate stiffness is four times as large.
-  CHECK_FALSE(no_number(network, std::vector{1e-308}, 1.0));
-  CHECK(no_number(network, std::vector{1e-308}, 2.0));
+  CHECK_FALSE(find_invalid_number(network, std::vector{1e-308}, 1.0));
+  CHECK(find_invalid_number(network, std::vector{1e-308}, 2.0));
 }
 
 TEST_CASE("a mode that no number keeps is told", "[stages]") {
   const auto told = [](const std::string& mass, const std::string& mode) {
     const Network network =
         network_of("@b body " + mass + " p\n@b1 mode @b " + mode + " 1.\n@out1 posOutput [@b p]\n");
-    const auto error = no_number(network, std::vector<double>{}, 1.0);
+    const auto error = find_invalid_number(network, std::vector<double>{}, 1.0);
     return error ? error->message : "";
   };
   CHECK(told("1.", "1e150 1.") == "");
@@ -90,7 +91,7 @@ TEST_CASE("a range is narrowed to what is stable, and nobody else's", "[stages]"
   const Network network = network_of(held_mass);
   Preset preset = struck(1);
   preset.parameters.push_back({"K", 0.5, 0.1, 9.0, {7, 3}});
-  const auto asked = asked_ranges(network, preset, false);
+  const auto asked = requested_ranges(network, preset, false);
   const StabilityCheck check = check_stability({.written = network,
                                                 .expanded = network,
                                                 .preset = preset,
@@ -153,12 +154,11 @@ TEST_CASE("keys know the lowest mode in samples of the engine's own rate", "[sta
   const Network network = network_of(held_mass);
   const auto shapes = lowest_shapes(network, std::vector{0.5});
   REQUIRE(shapes);
-  Analysis analysis{.mode = shapes->mode,
-                    .pitches = make_pitches(*shapes, {}, 88200.0, 0.5),
-                    .stability = {},
-                    .margins = {.whole = 15.6, .keys = 4.0, .home = {}, .away = {}},
-                    .rest_bounds = {}};
-  const Playing playing = make_playing(network, struck(1), analysis, false, 3, 0.25);
+  const Proof proof{.margins = {.whole = 15.6, .keys = 4.0}};
+  const TunedKeys keys{.mode = shapes->mode,
+                       .pitches = make_pitches(*shapes, {}, 88200.0, 0.5),
+                       .highest_factor = 4.0};
+  const Playing playing = make_playing(network, struck(1), proof, keys, false, 3, 0.25);
   CHECK(playing.voices == 3);
   CHECK(playing.gain == 0.25);
   CHECK(playing.tuning == Tuning::keyboard);
@@ -168,13 +168,12 @@ TEST_CASE("keys know the lowest mode in samples of the engine's own rate", "[sta
         Approx((2.0 - 0.025 - 2.0 * std::sqrt(0.975) * cosine) / 0.0625).epsilon(1e-11));
   REQUIRE(playing.controls.size() == 1);
   CHECK(playing.controls[0].gesture == Gesture::impulse);
-  const Instrument instrument = make_instrument(network, struck(1), analysis, 3, 0.25);
+  const Instrument instrument = make_instrument(network, struck(1), proof, keys, 3, 0.25);
   // cos(theta) = (2 - 4 * 0.0625 - 0.025) / (2 sqrt(1 - 0.025))
   CHECK(instrument.highest_frequency_hz ==
         Approx(88200.0 / (2.0 * std::numbers::pi) * std::acos(1.725 / (2.0 * std::sqrt(0.975))))
             .epsilon(1e-6));  // between two semitones
-  analysis.mode.reset();
-  CHECK(make_playing(network, struck(1), analysis, false, 3, 0.25).tuning == Tuning::fixed);
+  CHECK(make_playing(network, struck(1), proof, {}, false, 3, 0.25).tuning == Tuning::fixed);
 }
 
 TEST_CASE("the gain of a blow on one mass is what its height asks for", "[stages]") {
@@ -182,7 +181,7 @@ TEST_CASE("the gain of a blow on one mass is what its height asks for", "[stages
   const Network network =
       network_of("@o osc 1. 2. 0. 0. 0.\n@in1 frcInput @o\n@out1 posOutput @o\n");
   const Machine machine = make_machine(network, 44100.0, true);
-  const Playing playing = make_playing(network, struck(1), {}, false, 1, 1.0);
+  const Playing playing = make_playing(network, struck(1), {}, {}, false, 1, 1.0);
   const auto gain = find_gain(machine, playing, Precision::float64, best_isa(), {});
   REQUIRE(gain);
   CHECK(*gain == Approx(0.5 / 0.08).epsilon(1e-12));

@@ -440,7 +440,7 @@ TEST_CASE("all that does not fit the model is told at once", "[preset]") {
       "model = \"x.mdl\"\n[[control]]\nfrom = \"cc1\"\nto = \"Q\"\n[[control]]\n"
       "from = \"note\"\nto = \"in2\"\n[parameters]\nP = { value = 1, range = [0, 1] }\n");
   REQUIRE(preset.ok());
-  const auto found = misfits(network_of(scenes::poly_triangle()), preset.preset);
+  const auto found = find_preset_errors(network_of(scenes::poly_triangle()), preset.preset);
   REQUIRE(found.size() == 3);
   CHECK(found[0].line == 2);
   CHECK(found[0].message == "the model has no parameter 'Q'; it has m_K, m_Z");

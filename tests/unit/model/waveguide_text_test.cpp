@@ -59,13 +59,15 @@ TEST_CASE("what is no waveguide is told in plain words", "[waveguide_text]") {
 }
 
 TEST_CASE("a waveguide without room for its places is refused with its line", "[waveguide_text]") {
-  CHECK(refused("@s waveguide 1. 9000. 2. 0.5 0.\n" + heard) ==
-        "1:1 the waveguide 's' is to sound at 9000 Hz: with so many places on it, at most 5880 Hz "
-        "have room at this sample rate");
+  CHECK(
+      refused("@s waveguide 1. 9000. 2. 0.5 0.\n" + heard) ==
+      "1:1 the frequency 9000 Hz of the waveguide 's' is too high: with this number of places the "
+      "limit at this sample rate is 5880 Hz");
   CHECK(compile_network(network_of("@s waveguide 1. 9000. 2. 0.5 0.\n" + heard), Preset{},
                         {.rate_hz = 96000.0}));
   CHECK(refused("@f param 0.\n@s waveguide 1. f*100 2. 0.5 0.\n" + heard)
-            .starts_with("2:1 the waveguide 's' is to sound at 0 Hz, but 15 Hz is the lowest"));
+            .starts_with(
+                "2:1 the frequency 0 Hz of the waveguide 's' is too low: the limit is 15 Hz"));
   CHECK(refused("@f param 0.\n@s waveguide f 100 2. 0.5 0.\n" + heard) ==
         "2:1 the impedance f of 's' is not above 0 where f = 0");
 }

@@ -1,4 +1,4 @@
-#include "core/compile/accuracy/grip.h"
+#include "core/compile/accuracy/bow_limit.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,17 +13,18 @@
 namespace ressort::compile {
 namespace {
 
-constexpr double most_of_mass = 3.0;
-constexpr double steps_by_name = 4.0;  // of --method oversampled
+constexpr double highest_ratio = 3.0;         // Z / M
+constexpr double steps_of_oversampled = 4.0;  // of --method oversampled
 constexpr double highest_rate_hz = 768'000.0;
 
 bool is_bow(Law law, Scheme scheme) {
   return facts_of(law).family == Family::bow && scheme != Scheme::plain;
 }
 
-// How far both ends give way to a force of 1.
-double give_of(const Network& network, const Link& link, std::span<const Range> arguments,
-               std::span<const double> start) {
+// Returns the displacement of both ends for a force of 1 during one sample, 1/M summed over the
+// masses behind them.
+double inverse_mass_of(const Network& network, const Link& link, std::span<const Range> arguments,
+                       std::span<const double> start) {
   std::map<std::uint32_t, double> shares;
   const auto add = [&](std::uint32_t end, double sign) {
     each_share(
@@ -32,22 +33,22 @@ double give_of(const Network& network, const Link& link, std::span<const Range> 
   };
   add(link.a, 1.0);
   add(link.b, -1.0);
-  double give = 0.0;
+  double sum = 0.0;
   for (const auto& [mass, share] : shares) {
     const Mass& moved = network.masses[mass];
     if (moves(moved)) {
-      give += share * share / range_at(arguments, moved.mass).lowest;
+      sum += share * share / range_at(arguments, moved.mass).lowest;
     }
   }
-  return give;
+  return sum;
 }
 
 }  // namespace
 
-std::optional<StrongBow> strongest_bow(const Network& network, std::span<const LinkScheme> schemes,
-                                       const ParameterBox& box, std::span<const double> start,
-                                       double rate_ratio) {
-  std::optional<StrongBow> strongest;
+std::optional<Bow> find_strongest_bow(const Network& network, std::span<const LinkScheme> schemes,
+                                      const ParameterBox& box, std::span<const double> start,
+                                      double rate_ratio) {
+  std::optional<Bow> strongest;
   std::vector<Range> arguments;
   for (std::size_t i = 0; i < schemes.size(); ++i) {
     const Link& link = network.links[i];
@@ -60,18 +61,19 @@ std::optional<StrongBow> strongest_bow(const Network& network, std::span<const L
     if (arguments.empty()) {
       arguments = argument_ranges(network, box);
     }
-    const double give = give_of(network, link, arguments, start);
+    const double inverse_mass = inverse_mass_of(network, link, arguments, start);
     const ArgumentId z = link.arguments[facts_of(link.law).slot(Role::damping)];
     const double strength = rate_ratio * range_at(arguments, z).highest;
-    if (give > 0.0 &&
-        (!strongest || strength * give * strongest->most > most_of_mass * strongest->strength)) {
-      strongest = StrongBow{std::string(link.name), link.location, strength, most_of_mass / give};
+    if (inverse_mass > 0.0 && (!strongest || strength * inverse_mass * strongest->limit >
+                                                 highest_ratio * strongest->strength)) {
+      strongest =
+          Bow{std::string(link.name), link.location, strength, highest_ratio / inverse_mass};
     }
   }
   return strongest;
 }
 
-double steps_of_bows(const Machine& machine) {
+double bow_steps_per_sample(const Machine& machine) {
   double fewest = HUGE_VAL;
   for (const Program& program : machine.parts) {
     const bool has_bow =
@@ -84,8 +86,8 @@ double steps_of_bows(const Machine& machine) {
   return std::isfinite(fewest) ? fewest : 1.0;
 }
 
-std::optional<Error> too_strong(const StrongBow& bow, double steps, double rate_hz) {
-  const double needed = bow.strength / bow.most;
+std::optional<Error> check_bow(const Bow& bow, double steps, double rate_hz) {
+  const double needed = bow.strength / bow.limit;
   if (!(needed > steps)) {
     return std::nullopt;
   }
@@ -95,20 +97,24 @@ std::optional<Error> too_strong(const StrongBow& bow, double steps, double rate_
     return std::string(text);
   };
   const double higher_hz = std::ceil(needed / steps * rate_hz / 1000.0) * 1000.0;
-  std::string remedy = steps < steps_by_name && needed < steps_by_name
-                           ? "--method oversampled or a rate of "
-                           : "a rate of ";
-  remedy += print_number(higher_hz) + " Hz plays it right";
-  return Error{"the bow '" + bow.name + "' is too strong for its steps: Z is " +
-                   rounded(bow.strength / steps) + " in each and should be below " +
-                   rounded(bow.most) + ", three times the mass that it holds; it lets go too " +
-                   "early, and one mass alone squeaks far above its pitch; " +
-                   (higher_hz <= highest_rate_hz ? remedy : "with a smaller Z it would be right"),
+  std::string remedy = "lower Z";
+  if (higher_hz <= highest_rate_hz) {
+    remedy += ", or use ";
+    remedy += steps < steps_of_oversampled && needed < steps_of_oversampled
+                  ? "--method oversampled or a rate of "
+                  : "a rate of ";
+    remedy += print_number(higher_hz) + " Hz";
+  }
+  return Error{"the bow '" + bow.name + "' is too strong: its Z of " +
+                   rounded(bow.strength / steps) + " per time step exceeds the limit of " +
+                   rounded(bow.limit) +
+                   ", three times the mass that it moves. It slips too early, " +
+                   "and a single mass squeaks far above its pitch; " + remedy,
                bow.location.line, bow.location.column};
 }
 
-double too_strong_from(const StrongBow& bow, double steps) {
-  const double root = steps * bow.most / bow.strength;
+double highest_bow_factor(const Bow& bow, double steps) {
+  const double root = steps * bow.limit / bow.strength;
   return root * root;
 }
 

@@ -1,0 +1,55 @@
+// core/compile: the inputs of one compilation, which every stage reads and none changes.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "core/compile/machine.h"
+#include "core/compile/plan.h"
+#include "core/compile/stability_check.h"
+#include "core/engine/engine.h"
+#include "core/model/network.h"
+#include "core/model/preset/preset.h"
+#include "core/progress.h"
+
+namespace ressort::compile {
+
+struct CompileOptions {
+  double rate_hz = 44100.0;
+  bool rescale = true;    // the model's numbers are meant at 44,100 Hz: keep pitch and decay
+  bool bare = false;      // no smoothing and no sleep: the network as it is written
+  int voices = 0;         // replaces the preset's number; 0: the preset's
+  NoteShare::Part share;  // share of the notes that this engine plays
+  Precision precision = Precision::float64;
+  std::optional<Method> method;  // replaces the plan's choice, or the bare network's direct form
+  std::optional<Budget> budget;  // replaces the preset's
+  Isa isa = best_isa();          // no wider than the machine's
+  std::uint32_t most_modes = patient_modes;  // masses of a part up to which modes are computed
+  Executor* executor = nullptr;              // helper threads; outlives the engine; null: none
+  bool find_gain = false;         // choose the gain so that a forte note peaks at -6 dBFS
+  bool force = false;             // do not narrow ranges to stable values
+  std::vector<Setting> settings;  // initial values of the bare network's parameters
+  std::vector<Setting> reach;     // values that its parameters will get later
+  Progress progress = {};         // stopping it makes compile_network() fail with `stopped`
+  std::uint64_t most_bytes = std::numeric_limits<std::uint64_t>::max();  // limit of the engine
+};
+
+struct CompileRequest {
+  const Network& written;  // with its macros
+  const Preset& preset;
+  const CompileOptions& options;
+  Budget budget = options.budget.value_or(preset.budget);
+  double rate_ratio = rate_ratio_of(options.rate_hz, options.rescale);
+  int voices = options.voices > 0 ? options.voices : preset.voices;
+
+  // Returns whether the output has to be the published scheme to the bit: a bare network without a
+  // budget or another method.
+  bool is_published() const {
+    return options.bare && (!options.method || *options.method == Method::direct) &&
+           !budget.is_physical() && budget.silence_db == -Budget::unlimited;
+  }
+};
+
+}  // namespace ressort::compile
