@@ -13,7 +13,7 @@
 
 namespace ressort::compile {
 
-// In a larger network keys do not set the pitch: finding its lowest mode would take too long.
+// Keys do not set the pitch of a larger network: finding its lowest mode would take too long.
 inline constexpr std::size_t most_tuned_masses = 150'000;
 
 struct Analysis {

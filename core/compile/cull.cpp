@@ -21,9 +21,9 @@ class Culler {
           link.a != link.b && (moves(network_.masses[link.a]) || moves(network_.masses[link.b]));
       culled_.idle += culled_.is_slack.back() && is_tied ? 1 : 0;
     }
-    join();
-    listen();
-    decide();
+    join_groups();
+    mark_heard();
+    mark_dead();
     return std::move(culled_);
   }
 
@@ -48,7 +48,7 @@ class Culler {
     return moves(network_.masses[mass]) || kind == MassKind::point || kind == MassKind::junction;
   }
 
-  void join() {
+  void join_groups() {
     each_live_link([&](const Link& link) {
       if (carries(link.a) && carries(link.b)) {
         groups_.join(link.a, link.b);
@@ -58,8 +58,9 @@ class Culler {
         network_, groups_, progress_, [](std::uint32_t) { return true; }, [](std::uint32_t) {});
   }
 
-  // Who hears a force at a ground or at a hand hears what pulls there.
-  void listen() {
+  // Marks the groups that outputs hear. A force output at a ground or a position input hears the
+  // groups at the other ends of its links.
+  void mark_heard() {
     std::vector<bool> hears_links(network_.masses.size());
     for (const Output& output : network_.outputs) {
       is_listened_[output.mass] = true;
@@ -76,7 +77,7 @@ class Culler {
     });
   }
 
-  void decide() {
+  void mark_dead() {
     culled_.is_dead.assign(network_.masses.size(), true);
     for (std::uint32_t i = 0; i < network_.masses.size(); ++i) {
       if (!carries(i)) {
@@ -117,7 +118,7 @@ class Culler {
   Groups groups_;
   Culled culled_;
   std::vector<bool> is_heard_;     // [group]
-  std::vector<bool> is_listened_;  // [mass] by an output
+  std::vector<bool> is_listened_;  // [mass] has an output
 };
 
 std::string masses(std::size_t count) {
@@ -138,8 +139,8 @@ std::string describe(const Culled& culled) {
     }
   };
   add(culled.unheard, masses(culled.unheard) + " that no output hears");
-  add(culled.idle, std::to_string(culled.idle) +
-                       (culled.idle == 1 ? " link that exerts" : " links that exert") + " nothing");
+  add(culled.idle,
+      std::to_string(culled.idle) + (culled.idle == 1 ? " link" : " links") + " without strength");
   return text;
 }
 

@@ -1,4 +1,5 @@
-// core/compile: what of a network need not be computed, without a bit of any output changing.
+// core/compile: the stage that leaves out elements which no output can hear. It changes no bit of
+// any output.
 #pragma once
 
 #include <cstddef>
@@ -13,14 +14,14 @@
 
 namespace ressort::compile {
 
-// Joins every place on a macro that counts with all of the macro's nodes, and places on a waveguide
-// with each other; `meet` hears of each node once.
+// Joins the groups of each place on a macro for which counts(place) with those of all nodes of the
+// macro, and the groups of places on the same waveguide. Calls meet(node) once for each node.
 template <class Counts, class Meet>
 void join_places(const Network& network, Groups& groups, const Progress& progress, Counts&& counts,
                  Meet&& meet) {
   std::vector<bool> is_joined(network.masses.size(), false);  // [first node] of a macro
-  std::vector<std::uint32_t> first(network.waveguides.size(), no_argument);  // of their places
-  std::map<std::uint32_t, std::uint32_t> macros;                             // and of macros
+  std::vector<std::uint32_t> first(network.waveguides.size(), no_argument);  // place of each
+  std::map<std::uint32_t, std::uint32_t> macros;  // macro -> its first place
   for (std::uint32_t i = 0; i < network.masses.size(); ++i) {
     if (network.masses[i].kind == MassKind::junction && counts(i)) {
       std::uint32_t& other = first[network.taps[network.masses[i].tap].macro];
@@ -43,20 +44,20 @@ void join_places(const Network& network, Groups& groups, const Progress& progres
   }
 }
 
-// What can be left out. Grounds and position inputs pass nothing on, so that what hangs together
-// is what moves and is linked. Of that, whatever no output can hear is left out. What is heard may
-// be struck (core/engine/struck.h), whether or not anything else moves it.
+// Elements to leave out: connected components without an output, and links without strength.
+// Grounds and position inputs connect nothing, because no motion passes through them. Components
+// without an input stay, because their masses may be struck (core/engine/struck.h).
 struct Culled {
-  std::vector<bool> is_dead;   // [mass] of any kind
-  std::vector<bool> is_slack;  // [link] exerts nothing, whatever happens, or on dead masses only
-  std::size_t unheard = 0;     // masses that move, or would
-  std::size_t idle = 0;        // links whose stiffness and damping are 0
+  std::vector<bool> is_dead;   // [mass of any kind]
+  std::vector<bool> is_slack;  // [link] has no strength, or acts on dead masses only
+  std::size_t unheard = 0;     // number of dead masses that could move
+  std::size_t idle = 0;        // number of links whose stiffness and damping are 0
 };
 
-// For a network without macros. O(n). [any thread but audio]
+// For networks without macros. O(n). [any thread but audio]
 Culled cull(const Network& network, const Progress& progress = {});
 
-// "12 masses that no output hears, 1 link that exerts nothing"; empty if nothing is left out.
+// Returns "12 masses that no output hears, 1 link without strength"; empty if nothing is left out.
 std::string describe(const Culled& culled);
 
 }  // namespace ressort::compile

@@ -73,7 +73,7 @@ Preset without_swings(Preset preset);
 // Returns the preset with these ranges as positions. `swing`: peak displacement of a loud note.
 Preset in_positions(Preset preset, const Network& network, double swing);
 
-// How an engine of these stages is played. O(inputs * links). [any thread but audio]
+// Collects the results of the stages for the engine. O(inputs * links). [any thread but audio]
 Playing make_playing(const Network& network, const Preset& preset, const Proof& proof,
                      const TunedKeys& keys, bool bare, int voices, double gain);
 Instrument make_instrument(const Network& network, const Preset& preset, const Proof& proof,

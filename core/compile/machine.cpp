@@ -72,7 +72,7 @@ class ProgramMaker {
   }
 
  private:
-  // One coefficient for every distinct pair of argument and unit.
+  // Returns the coefficient of an argument in a unit. Elements with the same argument share it.
   std::uint32_t coefficient(ArgumentId argument, Unit unit, bool is_fixed = false) {
     const auto next = static_cast<std::uint32_t>(program_.coefficients.size());
     const auto [entry, is_new] = known_.try_emplace(CoefficientKey{argument, unit, is_fixed}, next);
@@ -111,6 +111,7 @@ class ProgramMaker {
     return argument == no_argument ? nothing : network_.arguments[argument];
   }
 
+  // Registers the coefficient with the parameters of a formula.
   void depend(std::uint32_t coefficient, const Formula& formula) {
     for (const Step& step : formula) {
       if (step.op == Op::parameter) {
@@ -122,7 +123,8 @@ class ProgramMaker {
     }
   }
 
-  // A run of one mode of a body, whose three coefficients depend on each other's formulas.
+  // Adds a run for one mode of a body. Its three coefficients depend on the formulas of all three,
+  // because sampling a mode exactly mixes mass, stiffness and damping (core/sampled_mode.h).
   void add_mode(std::uint32_t node, const Mass& mass) {
     const auto mode = static_cast<std::uint32_t>(program_.modes.size());
     const auto add = [&](ArgumentId argument, Unit unit) {
@@ -199,7 +201,7 @@ class ProgramMaker {
   }
 
   void place_taps() {
-    std::map<std::uint32_t, std::uint32_t> known;  // first mass of a macro -> its tap nodes
+    std::map<std::uint32_t, std::uint32_t> known;  // first mass of a macro -> first of tap_nodes
     for (const std::uint32_t i : share_.masses) {
       if (network_.masses[i].kind != MassKind::point) {
         continue;
@@ -274,8 +276,8 @@ class ProgramMaker {
     }
   }
 
-  // Where a wave meets no spring for longest: nothing between two springs that hold a string is
-  // shorter or longer than to a sample, but for where the filters are.
+  // Puts the filters of each waveguide into the longest stretch without a spring. Their delay is no
+  // whole number of samples, and would detune the stretch between two springs.
   void place_filters() {
     std::vector<bool> is_held(program_.moving, false);
     for (const LinkRun& run : program_.link_runs) {
@@ -312,8 +314,8 @@ class ProgramMaker {
   std::map<CoefficientKey, std::uint32_t> known_;
 };
 
-// Divides what is left of a network without macros. What is held by a ground alone holds nothing
-// together, unless somebody listens to the ground.
+// Divides a culled network into connected components. Grounds connect nothing, except grounds with
+// an output.
 class Divider {
  public:
   Divider(const Network& network, const Culled& culled, const Progress& progress)
@@ -346,7 +348,7 @@ class Divider {
         shares[part_of(i)].masses.push_back(i);
       }
     }
-    std::vector<std::uint32_t> seen(binds_.size(), nowhere);  // in which part a ground is, the last
+    std::vector<std::uint32_t> seen(binds_.size(), nowhere);  // [ground] the last part that has it
     for (std::uint32_t l = 0; l < network_.links.size(); ++l) {
       const Link& link = network_.links[l];
       if (culled_.is_slack[l]) {
@@ -374,7 +376,7 @@ class Divider {
  private:
   std::size_t part_of(std::uint32_t mass) { return part_[groups_.find(mass)]; }
 
-  // The largest groups become parts of their own, all others one together.
+  // Makes a part of each of the largest groups, and one part of all others.
   void choose_parts() {
     std::vector<std::uint32_t> count(binds_.size(), 0);
     std::vector<std::uint32_t> roots;
@@ -405,8 +407,8 @@ class Divider {
   const Network& network_;
   const Culled& culled_;
   Groups groups_;
-  std::vector<bool> binds_;          // [mass]
-  std::vector<std::uint32_t> part_;  // [root]
+  std::vector<bool> binds_;          // [mass] connects the links that end on it
+  std::vector<std::uint32_t> part_;  // [root of a group]
   std::size_t parts_ = 0;
 };
 

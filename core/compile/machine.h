@@ -1,4 +1,4 @@
-// core/compile: a Network's numbers as tables.
+// core/compile: the stage that writes a network as tables of numbers, a Program for each part.
 #pragma once
 
 #include <span>
@@ -10,32 +10,32 @@
 
 namespace ressort::compile {
 
-inline constexpr std::size_t most_parts = 32;        // the smallest ones are lumped together
-inline constexpr std::size_t least_part_masses = 3;  // below, a part is not worth its own kernel
+inline constexpr std::size_t most_parts = 32;        // further parts are stepped as one
+inline constexpr std::size_t least_part_masses = 3;  // smaller parts are stepped as one
 
-// How a link's force is found; as LinkRun says.
+// The scheme that computes a link's force, as in LinkRun.
 struct LinkScheme {
   Scheme scheme = Scheme::plain;
   auto operator<=>(const LinkScheme&) const = default;
 };
 
-// How much faster the reference rate is: what numbers that are meant at 44 100 Hz are rescaled by.
+// Returns the ratio of 44,100 Hz to the sample rate, or 1 if numbers are not rescaled. Stiffness is
+// multiplied by its square, damping by the ratio.
 inline double rate_ratio_of(double rate_hz, bool rescale) {
   return rescale ? Network::reference_rate_hz / rate_hz : 1.0;
 }
 
-// A network without macros as tables, but for what was culled: divided into the parts that do not
-// touch each other, the largest first, each in the direct form. `rescale`: numbers are meant at
-// 44 100 Hz, keep pitch and decay at rate_hz. `schemes`: [link], nothing: all as published.
-// `start`: [parameter] what the machine's voices begin with. O(n log n). [any thread but audio]
+// Returns the network without culled elements, divided into its connected components, the largest
+// first, each in the direct form. For networks without macros. `schemes`: [link]; empty: all as
+// published. `start`: [parameter] initial values of the voices. O(n log n). [any thread but audio]
 Machine tabulate(const Network& network, const Culled& culled, std::span<const LinkScheme> schemes,
                  std::span<const double> start, double rate_hz, bool rescale,
                  const Progress& progress = {});
 
-// The same of a network as it is written, with nothing but its numbers.
+// Returns the tables of a network with its macros, culled and with all links as published.
 Machine make_machine(const Network& network, double rate_hz, bool rescale);
 
-// The same as one part with nothing culled, for tests and other ways of playing it.
+// Returns the tables of a network with its macros as one part, with nothing culled.
 Program make_program(const Network& network, double rate_hz, bool rescale,
                      std::span<const LinkScheme> schemes = {});
 

@@ -33,7 +33,7 @@ std::uint64_t engine_bytes(const Machine& machine, int voices, Precision precisi
   for (const Program& program : machine.parts) {
     bytes += voice_bytes(program, number_bytes);
   }
-  // With live helpers: the voices, a helper's copy, and a spare one for tasks of a late helper.
+  // Live helpers need a copy, and a spare copy for the tasks of a late helper.
   const std::uint64_t places = executor != nullptr && executor->is_live() ? 3 : 1;
   return fixed_bytes + places * bytes * lane_count(voices);
 }

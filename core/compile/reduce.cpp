@@ -65,7 +65,7 @@ class FormulaMaker {
     return *zero_;
   }
 
-  // Nothing if the formula would be too long.
+  // Returns nothing if the formula would be too long.
   std::optional<ArgumentId> sum(ArgumentId left, ArgumentId right) {
     if (left == no_argument || right == no_argument) {
       return left == no_argument ? right : left;

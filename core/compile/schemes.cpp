@@ -10,7 +10,7 @@
 namespace ressort::compile {
 namespace {
 
-// What may go wrong as published.
+// Returns how the published law may gain energy.
 std::string_view trouble(Family family) {
   switch (family) {
     case Family::spring:
@@ -29,7 +29,7 @@ std::string counted(const LawFacts& law, std::size_t count) {
   return std::to_string(count) + " " + std::string(count == 1 ? law.one : law.many);
 }
 
-// Which law is the first of a name: bows of two profiles are bows.
+// Returns the first law with this name. Bows of all profiles count as bows.
 std::size_t first_called(std::string_view one) {
   std::size_t i = 0;
   while (law_table()[i].one != one) {
@@ -38,7 +38,7 @@ std::size_t first_called(std::string_view one) {
   return i;
 }
 
-// All numbers by which it could exert a force are 0, and nobody can turn them.
+// Returns whether all stiffnesses and dampings are the constant 0.
 bool exerts_nothing(const Network& network, const Link& link) {
   const LawFacts& law = facts_of(link.law);
   for (std::size_t i = 0; i < law.count; ++i) {
@@ -59,7 +59,7 @@ bool exerts_nothing(const Network& network, const Link& link) {
 Schemes choose_schemes(const Network& network, const Budget& budget, const Progress& progress) {
   Schemes schemes;
   schemes.links.resize(network.links.size());
-  std::array<std::size_t, law_count> counts{};  // [law] links that are not linear, by their name
+  std::array<std::size_t, law_count> counts{};  // [first law of a name] nonlinear links
   const Link* first = nullptr;
   progress.spend(network.links.size());
   for (std::size_t i = 0; i < network.links.size(); ++i) {
@@ -95,9 +95,9 @@ Schemes choose_schemes(const Network& network, const Budget& budget, const Progr
     all += counts[i] > 0 ? (all.empty() ? "" : ", ") + who : "";
   }
   if (first != nullptr && budget.passive == Passivity::never) {
-    schemes.hazard = Error{"played as published, where nothing keeps " + all +
-                               " from making energy; --budget passive=auto does",
-                           first->location.line, first->location.column};
+    schemes.hazard = Error{
+        "played as published: " + all + " may gain energy. Use --budget passive=auto to prevent it",
+        first->location.line, first->location.column};
   }
   return schemes;
 }
@@ -108,12 +108,12 @@ Network without_passive(const Network& network, std::span<const LinkScheme> sche
     return network;
   }
   const std::vector<double> values = parameter_values(network);
-  std::size_t i = 0;  // those of macros come after these, and are plain
+  std::size_t i = 0;  // links of macros come last and are plain
   Network felt = network;
   std::erase_if(felt.links, [&](const Link& link) {
     const LawFacts& law = facts_of(link.law);
-    // Quadratic and cubic springs count with what they are at rest, by their own K and Z; what
-    // holds a waveguide with what it may have below 0.
+    // Quadratic and cubic springs count with their linear K and Z, links on a waveguide if these
+    // may be negative.
     const bool counts = i >= schemes.size() || is_plain(schemes[i]) ||
                         (law.contains_spring && law.is_curved) || pushes(network, link, values) ||
                         is_on_waveguide(network, link.a) || is_on_waveguide(network, link.b);

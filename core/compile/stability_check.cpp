@@ -15,11 +15,11 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t most_quick_work = 10'000'000;  // parameters times links
-constexpr double anywhere = 1e12;  // what counts as no limit where one has to reckon with it
-constexpr double to_spare = 0.98;  // of the stiffness that keys may use: higher, modes hardly decay
+constexpr double unbounded = 1e12;                   // stands for infinity in interval arithmetic
+constexpr double keys_share = 0.98;  // of the margin: modes at the limit hardly decay
 
 double finite(double value) {
-  return std::clamp(value, -anywhere, anywhere);
+  return std::clamp(value, -unbounded, unbounded);
 }
 
 class StabilityChecker {
@@ -44,19 +44,18 @@ class StabilityChecker {
     if (request_.is_open) {
       return std::move(result_);
     }
-    ask();
-    // Knobs first: sound gets what they leave.
+    find_requested_box();
+    // Ranges of the preset come first, then other parameters, then audio inputs.
     widen([&](std::size_t i) { return place_[i].has_value() && !is_audio(i); });
     widen([&](std::size_t i) { return !place_[i] && !is_audio(i); });
-    widen_sound();
+    widen_audio();
     for (std::size_t i = 0; i < start_.size(); ++i) {
-      settle(i);
+      report_range(i);
     }
     return std::move(result_);
   }
 
  private:
-  // With the start's numbers.
   Network starting(Network network) const {
     for (std::size_t i = 0; i < start_.size(); ++i) {
       network.parameters[i].value = start_[i];
@@ -79,7 +78,7 @@ class StabilityChecker {
     return stability_.prove(box_);
   }
 
-  // By the network as it is written, where a macro is one element.
+  // Names the culprit in the written network, where a macro is one element.
   Error complain() const {
     Error error = complaint(Stability(always_felt(result_.proved), request_.rate_ratio,
                                       Stability::most_exact_masses, request_.progress)
@@ -90,15 +89,15 @@ class StabilityChecker {
     return error;
   }
 
-  // Where the parameters are to be turned to, and which of that the preset says.
-  void ask() {
+  // Collects the values that parameters may get: from ranges, controls and later settings.
+  void find_requested_box() {
     asked_ = {start_, start_};
     place_.resize(start_.size());
     for (std::size_t i = 0; i < start_.size(); ++i) {
       const ParameterInfo& info = request_.parameters[i];
       if (is_audio(i)) {
-        reach_to(i, -anywhere);
-        reach_to(i, anywhere);
+        reach_to(i, -unbounded);
+        reach_to(i, unbounded);
       } else if (!request_.bare) {
         reach_to(i, info.minimum);
         reach_to(i, info.maximum);
@@ -121,10 +120,10 @@ class StabilityChecker {
       }
     }
     wanted_ = asked_;
-    // What is passive, and so not in the proof, has to pull.
+    // Passive links are not in the proof, but their stiffness and damping must not be negative.
     for (std::size_t k = 0; k < request_.schemes.size() && !request_.bare; ++k) {
       if (request_.schemes[k].scheme != Scheme::plain) {
-        keep_pulling(request_.expanded.links[k]);
+        keep_attractive(request_.expanded.links[k]);
       }
     }
   }
@@ -134,7 +133,8 @@ class StabilityChecker {
     asked_.highest[i] = std::max(asked_.highest[i], finite(value));
   }
 
-  // Takes some parameters as far as was asked for, or as far as they may go together.
+  // Extends the proved box in some parameters to the requested values or, if that is not stable, as
+  // far as all of them may go together.
   template <class Wanted>
   void widen(Wanted&& wanted) {
     std::vector<std::size_t> which;
@@ -154,13 +154,13 @@ class StabilityChecker {
       return;
     }
     for (std::size_t i = 0; !result_.is_together && i < which.size(); ++i) {
-      stretch(which[i], box_, wide);
+      extend_alone(which[i], box_, wide);
     }
     if (!result_.is_together && stability_.prove(wide) == Verdict::stable) {
       box_ = std::move(wide);
       return;
     }
-    // All by the same share, and then each as far as that leaves room.
+    // The same share for all, found by bisection; then each parameter takes the room that is left.
     const double share = stability_.share(box_, wide);
     ParameterBox shared = box_;
     for (const std::size_t i : which) {
@@ -173,7 +173,7 @@ class StabilityChecker {
     for (std::size_t k = 0; !result_.is_together && k < which.size(); ++k) {
       const std::size_t i = which[k];
       ParameterBox wider = shared;
-      stretch(i, shared, wider);
+      extend_alone(i, shared, wider);
       if (stability_.prove(wider) == Verdict::stable) {
         shared = std::move(wider);
       }
@@ -181,12 +181,12 @@ class StabilityChecker {
     box_ = std::move(shared);
   }
 
-  // Sound gets what knobs leave; where they went to the limit that is next to nothing, and they
-  // step back a little. It may make no stiffness, damping or mass negative that is not so at the
-  // start.
-  void widen_sound() {
+  // Audio inputs get the room that other parameters leave. If these took it all, their ranges
+  // shrink by a tenth, provided that an audio range grows tenfold by that. Audio must not make a
+  // stiffness, damping or mass negative that is not so at the start.
+  void widen_audio() {
     constexpr double knobs_share = 0.9;
-    constexpr double much_more = 10.0;
+    constexpr double least_growth = 10.0;
     ParameterBox back = box_;
     bool has_sound = false;
     for (std::size_t i = 0; i < start_.size(); ++i) {
@@ -203,7 +203,7 @@ class StabilityChecker {
     }
     const auto is_sound = [&](std::size_t i) { return is_audio(i); };
     for (std::size_t i = 0; i < start_.size(); ++i) {
-      if (is_audio(i) && !request_.bare) {  // which is what it is
+      if (is_audio(i) && !request_.bare) {
         each_strength([&](ArgumentId argument) { keep_positive(argument, i); });
       }
     }
@@ -211,8 +211,8 @@ class StabilityChecker {
     const ParameterBox beside = std::exchange(box_, std::move(back));
     widen(is_sound);
     const auto gains = [&](std::size_t i) {
-      return is_audio(i) &&
-             box_.highest[i] - box_.lowest[i] > much_more * (beside.highest[i] - beside.lowest[i]);
+      return is_audio(i) && box_.highest[i] - box_.lowest[i] >
+                                least_growth * (beside.highest[i] - beside.lowest[i]);
     };
     bool is_better = false;
     for (std::size_t i = 0; i < start_.size(); ++i) {
@@ -223,7 +223,7 @@ class StabilityChecker {
     }
   }
 
-  // Calls `use` with what must not be negative.
+  // Calls use(argument) for every mass, stiffness and damping.
   template <class Use>
   void each_strength(Use&& use) const {
     std::set<ArgumentId> all;
@@ -242,7 +242,7 @@ class StabilityChecker {
     std::for_each(all.begin(), all.end(), use);
   }
 
-  // Asks of sound no more than keeps this argument from falling below 0.
+  // Limits an audio parameter to values that keep this argument from falling below 0.
   void keep_positive(ArgumentId argument, std::size_t i) {
     const Formula& formula = request_.expanded.arguments[argument];
     const auto uses = [&](const Step& step) { return step.op == Op::parameter && step.index == i; };
@@ -252,8 +252,8 @@ class StabilityChecker {
     keep(i, [&](const ParameterBox& box) { return formula_range(formula, box).lowest >= 0.0; });
   }
 
-  // Asks of parameters no more than keeps stiffness and damping of a link from falling below 0.
-  void keep_pulling(const Link& link) {
+  // Limits parameters to values that keep the stiffness and damping of a link from falling below 0.
+  void keep_attractive(const Link& link) {
     const auto& formulas = request_.expanded.arguments;
     const auto pulls = [&](const ParameterBox& box) {
       LawNumbers least{};
@@ -273,7 +273,7 @@ class StabilityChecker {
     }
   }
 
-  // Asks of a parameter no more than what `holds` of the box, as it does at the start.
+  // Limits a parameter to values for which `holds(box)`, by bisection from the start.
   template <class Holds>
   void keep(std::size_t i, Holds&& holds) {
     ParameterBox box = box_;
@@ -294,7 +294,7 @@ class StabilityChecker {
       if (std::min(inside, outside) < 0.0 && std::max(inside, outside) > 0.0 && holds_to(0.0)) {
         inside = 0.0;
       }
-      constexpr int halvings = 120;  // from 1e12 to the last digit of what is small
+      constexpr int halvings = 120;  // from 1e12 to the last digit of a small number
       for (int n = 0; n < halvings; ++n) {
         const double middle = std::midpoint(inside, outside);
         (holds_to(middle) ? inside : outside) = middle;
@@ -303,8 +303,8 @@ class StabilityChecker {
     }
   }
 
-  // One parameter as far as it may go alone, with the others in `from`.
-  void stretch(std::size_t i, const ParameterBox& from, ParameterBox& box) {
+  // Extends one parameter as far as is stable with the others in `from`.
+  void extend_alone(std::size_t i, const ParameterBox& from, ParameterBox& box) {
     if (const auto safe = stability_.safe_range(from, i, start_[i])) {
       box.lowest[i] = std::max(wanted_.lowest[i], below(i, safe->lowest));
       box.highest[i] = std::min(wanted_.highest[i], above(i, safe->highest));
@@ -313,7 +313,7 @@ class StabilityChecker {
     }
   }
 
-  // A limit from within; the start is always inside.
+  // Rounds a limit inwards; the start stays inside.
   double below(std::size_t i, double limit) const {
     return std::min(start_[i], finite(inside_limit(limit, false)));
   }
@@ -326,13 +326,13 @@ class StabilityChecker {
                            : std::min(start, inside_limit(value, false));
   }
 
-  // What one parameter came to.
-  void settle(std::size_t i) {
+  // Writes the range and the limits of one parameter, and an error if the preset's range is too
+  // wide.
+  void report_range(std::size_t i) {
     ParameterInfo& info = result_.parameters[i];
     if (is_audio(i) && box_.lowest[i] == box_.highest[i]) {
-      return;  // nothing is proved of it; sound that cannot move would be of no use
+      return;  // nothing is proved; an audio input without a range would be useless
     }
-    // Nobody reads it of the bare network.
     if (const auto safe = request_.bare || result_.is_together
                               ? std::nullopt
                               : stability_.safe_range(box_, i, start_[i])) {
@@ -340,7 +340,7 @@ class StabilityChecker {
     }
     if (is_audio(i)) {
       const auto or_none = [](double value) {
-        return std::fabs(value) < anywhere ? value : std::copysign(infinity, value);
+        return std::fabs(value) < unbounded ? value : std::copysign(infinity, value);
       };
       result_.limits[i] = {or_none(box_.lowest[i]), or_none(box_.highest[i])};
       info.minimum = result_.limits[i].lowest;
@@ -350,7 +350,7 @@ class StabilityChecker {
     info.is_raised = box_.lowest[i] > asked_.lowest[i];
     info.is_lowered = box_.highest[i] < asked_.highest[i];
     Limits& limit = result_.limits[i];
-    // Where nothing limits, the range is a matter of taste.
+    // A side without a stability limit has no enforced limit either: the range is a preference.
     if (info.is_raised || (!request_.bare && std::isfinite(info.safe.lowest))) {
       limit.lowest = box_.lowest[i];
     }
@@ -379,10 +379,10 @@ class StabilityChecker {
   std::vector<double> start_;
   Stability stability_;
   StabilityCheck result_;
-  ParameterBox asked_;
-  ParameterBox wanted_;                               // of that, what makes nothing push
-  ParameterBox box_;                                  // proved
-  std::vector<std::optional<SourceLocation>> place_;  // in the preset, of what it has ranges for
+  ParameterBox asked_;                                // requested values
+  ParameterBox wanted_;                               // those that make no stiffness negative
+  ParameterBox box_;                                  // proved values
+  std::vector<std::optional<SourceLocation>> place_;  // [parameter] line of its range in the preset
 };
 
 class MarginFinder {
@@ -405,7 +405,7 @@ class MarginFinder {
                              ? bound
                              : std::min(most_bounded, stability_->stiffness_factor(box));
     return {whole,
-            std::max(bound, to_spare * whole)};  // the bound has something to spare by itself
+            std::max(bound, keys_share * whole)};  // the edge bound is conservative by itself
   }
 
  private:
@@ -418,7 +418,7 @@ class MarginFinder {
 }  // namespace
 
 double inside_limit(double limit, bool is_upper) {
-  constexpr double room = 1e-8;  // more than the proof leaves for rounding
+  constexpr double room = 1e-8;  // exceeds the tolerance of the proof
   if (limit == 0.0 || !std::isfinite(limit)) {
     return limit;
   }
@@ -449,7 +449,7 @@ std::vector<ParameterInfo> requested_ranges(const Network& network, const Preset
     if (mass.mass != no_argument && network.arguments[mass.mass].size() == 1 &&
         network.arguments[mass.mass][0].op == Op::parameter) {
       ParameterInfo& info = infos[network.arguments[mass.mass][0].index];
-      info.minimum = 0.25 * info.value;  // nothing may become weightless
+      info.minimum = 0.25 * info.value;  // a mass must not become 0
     }
   }
   for (const ParameterSetting& setting : preset.parameters) {
@@ -504,7 +504,7 @@ ParameterBox proved_box(const StabilityCheck& check, const Preset& preset) {
 Margins find_margins(const Network& network, std::span<const LinkScheme> schemes,
                      const ParameterBox& box, std::span<const Limits> limits, double rate_ratio,
                      const Progress& progress) {
-  Network inside = network;  // with numbers of the box
+  Network inside = network;  // with parameter values in the box
   for (std::size_t i = 0; i < inside.parameters.size(); ++i) {
     double& value = inside.parameters[i].value;
     value = std::clamp(value, box.lowest[i], box.highest[i]);

@@ -425,8 +425,8 @@ TEST_CASE("all that no theorem covers is made passive, and told", "[passive]") {
   REQUIRE(never.hazard);
   CHECK(never.hazard->line == 7);
   CHECK(never.hazard->message ==
-        "played as published, where nothing keeps 1 spring that bends, 1 bow, 2 contacts "
-        "from making energy; --budget passive=auto does");
+        "played as published: 1 spring that bends, 1 bow, 2 contacts may gain energy. Use "
+        "--budget passive=auto to prevent it");
   CHECK(!usual.hazard);
   // Bows of two profiles, and springs of two laws, are told together.
   const std::vector<std::string> notes =

@@ -41,8 +41,9 @@ Accuracy difference(Complex wanted, Complex found, double rate_hz) {
           .t60_percent = std::fabs(100.0 * (decay / std::min(found.real(), slowest) - 1.0))};
 }
 
-// Which of the found poles becomes of which of the expected: those first that are the nearest, then
-// two change places where that brings both nearer together. What is left alone has none.
+// Assigns a found pole to each expected one: greedily by relative distance, then by exchanging two
+// assignments while that lowers the sum of squared distances. A pole without a partner gets
+// `nobody`.
 std::vector<std::size_t> pair_up(const Poles& expected, const Poles& found) {
   constexpr std::size_t nobody = static_cast<std::size_t>(-1);
   struct Pair {
@@ -72,15 +73,15 @@ std::vector<std::size_t> pair_up(const Poles& expected, const Poles& found) {
   const auto square = [&](std::size_t i, std::size_t j) {
     return std::norm(found[j] - expected[i]) / std::norm(expected[i]);
   };
-  bool goes_on = true;
-  for (std::size_t round = 0; goes_on && round < expected.size(); ++round) {
-    goes_on = false;
+  bool has_changed = true;
+  for (std::size_t round = 0; has_changed && round < expected.size(); ++round) {
+    has_changed = false;
     for (std::size_t a = 0; a < of.size(); ++a) {
       for (std::size_t b = a + 1; b < of.size(); ++b) {
         if (of[a] != nobody && of[b] != nobody &&
             square(a, of[b]) + square(b, of[a]) < square(a, of[a]) + square(b, of[b])) {
           std::swap(of[a], of[b]);
-          goes_on = true;
+          has_changed = true;
         }
       }
     }
@@ -88,26 +89,24 @@ std::vector<std::size_t> pair_up(const Poles& expected, const Poles& found) {
   return of;
 }
 
-// The worst of the partials that are heard, `expected` being about where a scheme should bring
-// `wanted`. So many may be without a partner.
-Accuracy compare(const Poles& wanted, const Poles& expected, const Poles& found, double rate_hz,
-                 std::size_t may_be_alone) {
+// Returns the largest error of the audible partials. `expected`: estimates of where the scheme
+// moves the `wanted` poles, which `found` is paired with.
+Accuracy compare(const Poles& wanted, const Poles& expected, const Poles& found, double rate_hz) {
   const std::vector<std::size_t> of = pair_up(expected, found);
   Accuracy worst;
-  std::size_t alone = 0;
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     if (of[i] < found.size()) {
       worst = is_heard(wanted[i], rate_hz)
                   ? worse_of(worst, difference(wanted[i], found[of[i]], rate_hz))
                   : worst;
-    } else if (++alone > may_be_alone && is_heard(wanted[i], rate_hz)) {
+    } else if (is_heard(wanted[i], rate_hz)) {
       worst = {endless, endless};
     }
   }
   return worst;
 }
 
-// Eigenvalues of [0 1; -K -Z].
+// Returns the eigenvalues of [0 1; -K -Z] with a positive imaginary part.
 Poles continuous_poles(const Springs& springs) {
   const std::size_t n = springs.size();
   Matrix flow(2 * n, 2 * n);
@@ -186,12 +185,12 @@ Judge::Judge(const Program& program, std::vector<Corner> corners, std::size_t mo
       corners_(std::move(corners)),
       most_masses_(most_masses),
       progress_(progress),
-      courses_(corners_.size()) {}
+      continuous_(corners_.size()) {}
 
 Accuracy Judge::of(const Form& form) {
   const Stepping stepping = stepping_of(form);
   if (stepping.scheme == Stepping::Scheme::exact) {
-    // Springs that bent links contain are felt at places, as published.
+    // Exact modes apply the linear spring of a nonlinear link as published.
     return contains_bent_springs(program_) ? unknown() : Accuracy{};
   }
   Accuracy worst;
@@ -201,38 +200,48 @@ Accuracy Judge::of(const Form& form) {
   return worst;
 }
 
-const Judge::Course& Judge::course(std::size_t corner) {
-  if (courses_[corner]) {
-    return *courses_[corner];
+Poles Judge::Continuous::all_poles() const {
+  Poles all = poles;
+  for (const Mode& mode : modes) {
+    if (const auto pole = continuous_pole(mode.stiffness, mode.damping)) {
+      all.push_back(*pole);
+    }
   }
-  Course& course = courses_[corner].emplace();
+  return all;
+}
+
+const Judge::Continuous& Judge::continuous_at(std::size_t corner) {
+  if (continuous_[corner]) {
+    return *continuous_[corner];
+  }
+  Continuous& continuous = continuous_[corner].emplace();
   const std::size_t n = program_.moving;
   if (n > std::max(most_masses_, most_coupled_masses)) {
-    course.is_known = false;
-    return course;
+    continuous.is_known = false;
+    return continuous;
   }
   progress_.spend(n * n);
   const Springs springs =
       springs_of(program_, corners_[corner].parameters, corners_[corner].stiffness_factor);
   if (!springs.is_sound) {
-    course.is_known = false;
-    return course;
+    continuous.is_known = false;
+    return continuous;
   }
   if (const auto modes = modes_of(springs)) {
     for (const auto& [stiffness, damping] : *modes) {
-      course.modes.push_back({stiffness, damping});
+      continuous.modes.push_back({stiffness, damping});
     }
-    return course;
+    return continuous;
   }
-  course.is_proportional = false;
+  continuous.is_proportional = false;
   const double work = 10.0 * std::pow(2.0 * static_cast<double>(n), 3.0);
   if (n > most_coupled_masses || work * 2.0 * static_cast<double>(corners_.size()) > most_work) {
-    course.is_known = false;
-    return course;
+    continuous.is_known = false;
+    return continuous;
   }
   progress_.spend(8 * n * n * n);
-  course.poles = continuous_poles(springs);
-  return course;
+  continuous.poles = continuous_poles(springs);
+  return continuous;
 }
 
 Accuracy Judge::at(std::size_t corner, const Stepping& stepping) {
@@ -255,7 +264,7 @@ Accuracy Judge::at(std::size_t corner, const Stepping& stepping) {
     return of_bodies(corner, stepping);
   }
   if (program.moving > most_masses_ && program.moving > most_coupled_masses) {
-    // Of dampers in proportion no modes are needed: none is stiffer than the edge bound.
+    // Rayleigh damping needs no modes: scan all stiffnesses up to the edge bound (Gershgorin).
     const auto proportion = rayleigh_of(program, numbers.parameters, numbers.stiffness_factor);
     if (!proportion) {
       return unknown();
@@ -271,19 +280,14 @@ Accuracy Judge::at(std::size_t corner, const Stepping& stepping) {
     bound.is_bound = true;
     return bound;
   }
-  const Course& course = this->course(corner);
-  if (!course.is_known) {
+  const Continuous& continuous = continuous_at(corner);
+  if (!continuous.is_known) {
     return unknown();
   }
-  if (course.is_proportional) {
-    return compare_modes(course.modes);
+  if (continuous.is_proportional) {
+    return compare_modes(continuous.modes);
   }
-  Poles wanted = course.poles;
-  for (const Mode& mode : course.modes) {
-    if (const auto pole = continuous_pole(mode.stiffness, mode.damping)) {
-      wanted.push_back(*pole);
-    }
-  }
+  const Poles wanted = continuous.all_poles();
   if (program.moving > most_coupled_masses) {
     return unknown();
   }
@@ -294,30 +298,25 @@ Accuracy Judge::at(std::size_t corner, const Stepping& stepping) {
   progress_.spend(std::size_t{8} * program.moving * program.moving * program.moving);
   return compare(wanted, expected,
                  stepping.poles(springs_of(program, numbers.parameters, numbers.stiffness_factor)),
-                 rate_hz, 0);
+                 rate_hz);
 }
 
-// Bodies' modes are exact as published; what ties them together is not.
+// The modes of bodies are exact in the published scheme; the springs between bodies are not.
 Accuracy Judge::of_bodies(std::size_t corner, const Stepping& stepping) {
   if (!has_linear_springs(program_)) {
     return {};
   }
-  const Course& course = this->course(corner);
+  const Continuous& continuous = continuous_at(corner);
   const Corner& numbers = corners_[corner];
-  if (!course.is_known || program_.moving > most_coupled_masses) {
+  if (!continuous.is_known || program_.moving > most_coupled_masses) {
     return unknown();
   }
-  Poles wanted = course.poles;
-  for (const Mode& mode : course.modes) {
-    if (const auto pole = continuous_pole(mode.stiffness, mode.damping)) {
-      wanted.push_back(*pole);
-    }
-  }
+  const Poles wanted = continuous.all_poles();
   progress_.spend(std::size_t{8} * program_.moving * program_.moving * program_.moving);
   return compare(
       wanted, wanted,
       stepping.poles(springs_of(program_, numbers.parameters, numbers.stiffness_factor, true)),
-      program_.rate_hz, 0);
+      program_.rate_hz);
 }
 
 }  // namespace ressort::compile

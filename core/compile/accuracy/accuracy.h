@@ -1,10 +1,10 @@
-// core/compile: how far the partials of what will run are off those of the continuous network that
-// its numbers describe, M x'' + Z x' + K x = 0: poles beside poles.
+// core/compile: the error of a form: the distance of its poles from those of the continuous network
+// M x'' + Z x' + K x = 0.
 //
-// What is nonlinear counts as open, but for the spring that its law contains. A partial counts up
-// to 20 kHz and half the sample rate, and if it lasts for a period; a decay of more than an hour
-// counts as none. Poles are found mode by mode where damping is proportional, else as the
-// eigenvalues of what one step makes of every state. Rounding is not counted.
+// Nonlinear links count as their linear spring, or not at all if they have none. A partial counts
+// up to 20 kHz and half the sample rate, if it decays by less than 60 dB in a period; T60 above one
+// hour counts as infinite. With proportional damping the poles are computed mode by mode, otherwise
+// as the eigenvalues of the matrix of one time step. Rounding errors are not included.
 #pragma once
 
 #include <complex>
@@ -21,50 +21,50 @@
 
 namespace ressort::compile {
 
-// The worst of all partials, without signs.
+// The largest errors of all partials, as absolute values. Infinite if a partial is missing.
 struct Accuracy {
   double cents = 0.0;
   double t60_percent = 0.0;
-  bool is_known = true;   // else it was not looked for, as that would take too long
-  bool is_bound = false;  // these are the most that it may be
+  bool is_known = true;   // false: computing the errors would take too long
+  bool is_bound = false;  // upper bounds
 
   bool meets(const Budget& budget) const {
     return is_known && cents <= budget.cents && t60_percent <= budget.t60_percent;
   }
 };
 
-// The worst of two, and what two say that come one after the other.
+// Return the larger and the sum of two errors.
 Accuracy worse_of(const Accuracy& a, const Accuracy& b);
 Accuracy sum_of(const Accuracy& a, const Accuracy& b);
 
-// Numbers that a network is played with.
+// Parameter values and pitch at which errors are computed.
 struct Corner {
   std::vector<double> parameters;  // [parameter]
   double stiffness_factor = 1.0;
 };
 
-// What is looked at of ranges: the start; each parameter at either of its ends while the others
-// start, up to most_single_parameters of them; all where the network is at its stiffest, with the
-// start's pitch and with `highest_factor`. Empty ranges: the start alone.
+// Returns the corners to examine: the start; each parameter at either end of its range with the
+// others at their start, for up to most_single_parameters; and the stiffest corner of all ranges,
+// at the start's pitch and at `highest_factor`. Empty ranges: the start only.
 inline constexpr std::size_t most_single_parameters = 8;
 std::vector<Corner> corners_of(const Program& program, std::span<const double> start,
                                std::span<const double> lowest, std::span<const double> highest,
                                double highest_factor);
 
-// Masses of a part up to which eigenvalues are sought where damping is not proportional; the time
-// grows with the third power, and with the corners.
+// Largest part with non-proportional damping whose eigenvalues are computed. The time grows with
+// the third power of the masses, and with the number of corners.
 inline constexpr std::size_t most_coupled_masses = 200;
 
-// Judges the forms of a part, all at the same corners. What it finds of the continuous network it
-// keeps. [any thread but audio]
+// Computes the errors of the forms of one part at the same corners. Keeps the poles of the
+// continuous network. [any thread but audio]
 class Judge {
  public:
-  // The Program outlives it. `most_masses`: for how many modes are sought where damping is
-  // proportional.
+  // The Program outlives it. `most_masses`: largest part with proportional damping whose modes are
+  // computed.
   Judge(const Program& program, std::vector<Corner> corners, std::size_t most_masses,
         const Progress& progress = {});
 
-  // Of the Program in a form of its own. O(corners * masses^3)
+  // Returns the error of a form of this Program. O(corners * masses^3)
   Accuracy of(const Form& form);
 
  private:
@@ -73,13 +73,14 @@ class Judge {
     double damping = 0.0;
   };
   // The continuous network at one corner.
-  struct Course {
+  struct Continuous {
     bool is_known = true;
     bool is_proportional = true;
-    std::vector<Mode> modes;                  // if it is
-    std::vector<std::complex<double>> poles;  // of those that swing
+    std::vector<Mode> modes;                  // with proportional damping
+    std::vector<std::complex<double>> poles;  // otherwise, of oscillating modes
+    std::vector<std::complex<double>> all_poles() const;
   };
-  const Course& course(std::size_t corner);
+  const Continuous& continuous_at(std::size_t corner);
   Accuracy of_bodies(std::size_t corner, const Stepping& stepping);
   Accuracy at(std::size_t corner, const Stepping& stepping);
 
@@ -87,7 +88,7 @@ class Judge {
   std::vector<Corner> corners_;
   std::size_t most_masses_;
   const Progress& progress_;
-  std::vector<std::optional<Course>> courses_;  // [corner]
+  std::vector<std::optional<Continuous>> continuous_;  // [corner]
 };
 
 }  // namespace ressort::compile

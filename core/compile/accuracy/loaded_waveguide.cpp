@@ -15,28 +15,31 @@ namespace {
 
 using Complex = std::complex<double>;
 
-// By what holds it, a logarithm of the factor: what is further off, at ln 4, is the second partial.
+// Largest detuning by the load, as a logarithm of the factor. The second partial is at ln 4.
 constexpr double most_detuning = 1.1;
-constexpr double out_of_room = 1.5;  // where it is designed at other frequencies than asked for
+// Ratio of frequencies beyond the limits of a waveguide at which its design is no longer
+// meaningful.
+constexpr double out_of_range = 1.5;
 
-// [place, 2] in samples from the filters, to the left and to the right.
+// [place, 2] delay in samples from the filters: of the left-going and of the right-going wave.
 using Delays = std::vector<std::uint32_t>;
 
-// A waveguide at one pole.
+// The transfer functions of a waveguide at one pole.
 struct Loop {
+  // Delay from one position to another.
   Complex after(std::uint32_t from, std::uint32_t to) const {
     return std::pow(back, static_cast<int>(to) - static_cast<int>(from));
   }
-  // What is left of a wave after one period.
+  // Gain of one round trip.
   Complex round() const { return filters * after(0, samples); }
-  // [place] what it hears of a wave of 1 that the filters send, and what they send of its own.
+  // From the filters' output to a place, and from a place to the filters' output.
   Complex heard(std::size_t place) const {
     return after(0, right(place)) + sign * after(0, left(place));
   }
   Complex sent(std::size_t place) const {
     return filters * (after(right(place), samples) + sign * after(left(place), samples));
   }
-  // What a wave of 1 that starts at one place is at another, before it comes to the filters.
+  // From one place to another without passing the filters.
   Complex between(std::size_t from, std::size_t to) const {
     Complex sum = 0.0;
     for (const auto& [start, way] : {std::pair(right(from), 1.0), std::pair(left(from), sign)}) {
@@ -50,7 +53,7 @@ struct Loop {
   std::uint32_t right(std::size_t place) const { return (*delays)[2 * place + 1]; }
 
   double inverse_impedance = 0.0;
-  double sign = 1.0;  // of what runs to the left
+  double sign = 1.0;  // of the left-going wave
   Complex back;       // 1/z
   Complex filters;
   std::uint32_t samples = 0;
@@ -101,7 +104,7 @@ class LoadedWaveguide final : public TunedMotion {
   std::size_t tuned_;
   const Progress& progress_;
   double own_hz_;
-  double highest_hz_;           // that there is room for
+  double highest_hz_;           // limit by the number of places
   std::vector<Delays> delays_;  // [waveguide]
 };
 
@@ -137,14 +140,14 @@ Loop LoadedWaveguide::loop_of(std::size_t guide, const std::vector<double>& valu
 Complex LoadedWaveguide::residual(double log_factor, double decay, double theta) const {
   const double hz = own_hz_ * std::exp(0.5 * log_factor);
   if (std::fabs(log_factor - std::log(alone_at(theta))) > most_detuning ||
-      hz > out_of_room * highest_hz_ || hz * out_of_room < lowest_waveguide_hz) {
+      hz > out_of_range * highest_hz_ || hz * out_of_range < lowest_waveguide_hz) {
     return std::nan("");
   }
   const std::vector<double> value = values_at(std::exp(log_factor));
   const Complex z = std::exp(Complex(-decay, theta));
   const Complex back = 1.0 / z;
-  const Complex both = z - back;  // from a sample before to one after
-  // How far every mass goes for a force of 1; places follow.
+  const Complex both = z - back;  // central difference over two samples
+  // Displacement of each mass under a force of 1.
   std::vector<Complex> gives(program_.moving);
   for (const MassRun& run : program_.mass_runs) {
     if (run.is_junction) {
@@ -168,7 +171,7 @@ Complex LoadedWaveguide::residual(double log_factor, double decay, double theta)
     }
     loops.push_back(loop_of(loops.size(), value, z));
   }
-  // How far one place goes for a force of 1 on another.
+  // Displacement of one place under a force of 1 on another.
   const auto way = [&](const Place& a, const Place& b, bool is_same) {
     if (a.loop != b.loop) {
       return Complex(0.0);
@@ -182,14 +185,15 @@ Complex LoadedWaveguide::residual(double log_factor, double decay, double theta)
                 [](const SpringDamper& spring) { return spring.is_own || spring.shares.empty(); });
   const std::size_t guides = loops.size();
   ComplexMatrix rows(guides + springs.size(), guides + springs.size());
-  // The tuned loop is the first.
+  // The tuned loop has row 0.
   const auto row_of = [&](std::size_t loop) {
     return loop == tuned_ ? 0 : (loop < tuned_ ? loop + 1 : loop);
   };
   for (std::size_t g = 0; g < guides; ++g) {
     rows(row_of(g), row_of(g)) = 1.0 - loops[g].round();
   }
-  // How much each spring is longer for a tension of 1 in each: masses one by one, places by pairs.
+  // Elongation of each spring under a tension of 1 in each: by shared masses and by pairs of
+  // places.
   std::vector<Complex> moved(program_.moving);
   for (std::size_t k = 0; k < springs.size(); ++k) {
     for (const auto& [node, share] : springs[k].shares) {

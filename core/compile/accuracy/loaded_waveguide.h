@@ -1,12 +1,12 @@
-// core/compile: where the lowest partial of a waveguide is once springs, masses and bodies hold on
-// to it: a stiff bridge makes the string shorter, a light one longer.
+// core/compile: the lowest partial of a waveguide that is loaded with springs, masses and bodies. A
+// stiff bridge shortens the string, a light one lengthens it.
 //
-// At a pole z every motion is X z^n, and the kernel's own equations become algebra: a mass moves by
-// D = 1/(M (z - 2 + 1/z) + K + Z (1 - 1/z)) for a force of 1, a place by what the waves around it
-// let it (core/kernels/waveguides/rails.h), a spring pulls by C = K + Z (1 - 1/z) a unit of its
-// length, or by C = (K (z + 1/z) + Z (z - 1/z))/2 where it is passive. One row for each spring's
-// tension and one for the wave in each loop; it can swing on its own where, once all others are
-// eliminated, nothing is left of the tuned loop's row.
+// At a pole z every signal is X z^n, which turns the kernel's equations into algebra. A force of 1
+// moves a mass by D = 1/(M (z - 2 + 1/z) + K + Z (1 - 1/z)) and a place by the admittance of its
+// waveguide (core/kernels/waveguides/rails.h). A unit of length pulls with C = K + Z (1 - 1/z), or
+// with C = (K (z + 1/z) + Z (z - 1/z))/2 in a passive spring. The unknowns are the tension of each
+// spring and the wave in each loop. z is a pole if the Schur complement of the tuned loop, all
+// other unknowns eliminated, is 0.
 #pragma once
 
 #include <optional>
@@ -18,11 +18,11 @@
 
 namespace ressort::compile {
 
-inline constexpr std::size_t most_loading_springs = 96;  // that a load has the time for
+inline constexpr std::size_t most_loading_springs = 96;  // a load has no time for more
 
-// By which factor on every stiffness the lowest waveguide that keys move has the pitch of a key;
-// `parameters` as they are at the start. Nothing where more springs than that are in its part, or
-// no waveguide moves. O(keys springs^3) [any thread but audio]
+// Returns the factors on every stiffness at which the lowest waveguide that keys tune has the pitch
+// of each key, at these values of the parameters. Nothing if its part has more than
+// most_loading_springs or if every waveguide is fixed. O(keys springs^3) [any thread but audio]
 std::optional<Pitches> loaded_waveguide_pitches(const Machine& machine,
                                                 std::span<const double> parameters,
                                                 const Progress& progress = {});

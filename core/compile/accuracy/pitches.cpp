@@ -15,19 +15,20 @@ using Complex = std::complex<double>;
 
 constexpr int most_newton_steps = 20;
 constexpr int most_roundings = 8;
-constexpr double arrived = 1e-12;         // a step, of a logarithm
-constexpr double small_step = 1e-6;       // for a derivative
-constexpr double most_change = 0.5;       // of a logarithm in a step
-constexpr double same_mode = 1e-6;        // two stiffnesses
-constexpr std::size_t most_sought = 320;  // masses of a part
+constexpr double converged = 1e-12;       // Newton step of a logarithm
+constexpr double small_step = 1e-6;       // for finite differences
+constexpr double most_change = 0.5;       // of a logarithm in one Newton step
+constexpr double same_mode = 1e-6;        // relative difference of two stiffnesses
+constexpr std::size_t most_sought = 320;  // masses of a part whose eigenvalues are computed
 
-// A motion's logarithm of the factor, and its decay.
+// The unknowns of Newton's method.
 struct PolePosition {
   double log_factor = 0.0;
   double decay = 0.0;
 };
 
-// Where the pole's angle is `theta` a sample, by Newton from a place near it.
+// Finds the factor and the decay at which the pole has this angle per sample, by Newton's method
+// with finite differences and a limited step.
 std::optional<PolePosition> pole_near(const TunedMotion& motion, double theta, PolePosition at) {
   for (int i = 0; i < most_newton_steps; ++i) {
     const Complex here = motion.residual(at.log_factor, at.decay, theta);
@@ -48,7 +49,7 @@ std::optional<PolePosition> pole_near(const TunedMotion& motion, double theta, P
     const double share = std::min(1.0, most_change / most);
     at.log_factor += share * more;
     at.decay += share * faster;
-    if (most < arrived) {
+    if (most < converged) {
       break;
     }
     if (i + 1 == most_newton_steps && !(most < 1e-9)) {
@@ -58,9 +59,9 @@ std::optional<PolePosition> pole_near(const TunedMotion& motion, double theta, P
   return at;
 }
 
-// The factor at which the pole's angle is `theta` a sample; from where it is as if the motion were
-// alone, times `change`. Where whole samples leave no factor that is right, the one that is the
-// least off.
+// Returns the factor at which the pole has this angle per sample. Newton starts at the uncoupled
+// mode's factor times `change`. If delays of whole samples leave no exact solution, returns the
+// factor with the smallest residual.
 std::optional<double> factor_at(TunedMotion& motion, double theta, double change) {
   const double factor = motion.alone_at(theta) * change;
   PolePosition at{std::log(factor), motion.decay_at(factor)};
@@ -105,7 +106,8 @@ class TunedMode final : public TunedMotion {
     }
   }
 
-  // Of a mode that swings alone: exactly for the published scheme and exact modes.
+  // The factor of an uncoupled mode, exact for the published scheme and for exact modes:
+  // cos(theta) = (2 - k - z) / (2 sqrt(1 - z)), or theta^2 = k - z^2/4.
   double alone_at(double theta) const override {
     const double k = springs_.stiffness(0, 0);
     const double z = springs_.damping(0, 0);
@@ -144,7 +146,8 @@ class TunedMode final : public TunedMotion {
   }
 
  private:
-  // Whether nothing swings along with it: what rounding leaves there counts by its square.
+  // Returns whether no other mode is coupled to the first. Coupling acts by its square, so rounding
+  // errors do not count.
   bool is_first_alone() const {
     constexpr double rounding = 1e-12;
     const double k = rounding * springs_.stiffness(0, 0);
@@ -159,7 +162,7 @@ class TunedMode final : public TunedMotion {
   }
 
   Springs springs_;
-  Matrix fixed_;  // stiffness that no key moves
+  Matrix fixed_;  // stiffness that keys do not change
   Stepping stepping_;
 };
 
@@ -167,12 +170,12 @@ class TunedMode final : public TunedMotion {
 
 Pitches make_pitches(TunedMotion& motion, double rate_hz) {
   Pitches pitches;
-  double change = 1.0;  // by what swings along, at the semitone above
+  double change = 1.0;  // of the factor by coupled modes, at the semitone above
   const double nyquist = 0.5 * rate_hz * (1.0 - 1e-9);
   for (double hz = pitches.lowest_hz; hz < nyquist; hz *= std::exp2(1.0 / 12.0)) {
     pitches.factors.push_back(0.0);
   }
-  // Dampers matter the least at the top.
+  // From the top down, because dampers matter least there.
   for (std::size_t i = pitches.factors.size(); i-- > 0;) {
     const double hz = pitches.lowest_hz * std::exp2(static_cast<double>(i) / 12.0);
     const double theta = 2.0 * std::numbers::pi * hz / rate_hz;
@@ -193,7 +196,7 @@ Pitches make_pitches(const LowestShapes& shapes, const Stepping& stepping, doubl
 
 Stepping stepping_of_lowest(const Machine& machine, const LowestShapes& shapes,
                             std::span<const double> parameters) {
-  constexpr double alone = 0.999;  // what ties it to other masses hardly matters
+  constexpr double alone = 0.999;  // share of bodies above which masses hardly matter
   if (shapes.share_of_modes > alone) {
     return {Stepping::Scheme::exact};
   }

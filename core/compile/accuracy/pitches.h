@@ -1,5 +1,5 @@
-// core/compile: by which factor on every stiffness the motion that keys tune has the frequency of a
-// key: of its damped pole, in the form that plays it.
+// core/compile: the factors on every stiffness at which the tuned mode, as the form steps it, has
+// the frequency of each key. The frequency is that of the damped pole.
 #pragma once
 
 #include <complex>
@@ -11,32 +11,31 @@
 
 namespace ressort::compile {
 
-// A motion whose pole a factor on every stiffness moves. Poles are those of a sample at the rate
-// that is played, z = e^(-decay + j theta).
+// A mode whose pole z = e^(-decay + j theta), per sample, depends on a factor on every stiffness.
 class TunedMotion {
  public:
   virtual ~TunedMotion() = default;
-  // What goes by whole samples is from now on, for residual(), as it is at this factor. Whether
-  // that has changed anything.
+  // Rounds delays to whole samples at this factor, for residual(). Returns whether one has changed.
   virtual bool round_at(double /*log_factor*/) { return false; }
-  // 0 where this is its pole, and else about as large as it is off.
+  // 0 at a pole, and of first order near it.
   virtual std::complex<double> residual(double log_factor, double decay, double theta) const = 0;
-  // The factor at which it would be if nothing else swung along.
+  // The factor at this angle if no other mode were coupled to it: Newton's initial value.
   virtual double alone_at(double theta) const = 0;
-  // How fast it would decay then.
+  // The decay of the uncoupled mode, per sample.
   virtual double decay_at(double factor) const = 0;
 };
 
-// For every semitone of 440 Hz from a tenth of a hertz to half the rate, by Newton on the pole.
-// [any thread but audio]
+// Returns a factor for each semitone of 440 Hz from a tenth of a hertz to half the rate, by
+// Newton's method on the complex pole. [any thread but audio]
 Pitches make_pitches(TunedMotion& motion, double rate_hz);
 
-// The same of the mode that is lowest without dampers, of `shapes`, per sample at 44 100 Hz, as the
-// form steps them at rate_hz; dampers stay while stiffness changes. [any thread but audio]
+// The same for the first mode of `shapes`, which are per sample at 44,100 Hz, as the form steps it
+// at rate_hz. Keys do not change dampers. [any thread but audio]
 Pitches make_pitches(const LowestShapes& shapes, const Stepping& stepping, double rate_hz,
                      double rate_ratio);
 
-// How the part of a machine steps that the lowest mode is in; that of a body is exact everywhere.
+// Returns the stepping of the part that contains the lowest mode, at these values of the
+// parameters. The modes of bodies are stepped exactly in every form.
 Stepping stepping_of_lowest(const Machine& machine, const LowestShapes& shapes,
                             std::span<const double> parameters);
 

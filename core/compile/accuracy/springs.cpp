@@ -10,9 +10,9 @@
 namespace ressort::compile {
 namespace {
 
-constexpr double shared_tolerance = 1e-9;  // of the largest: is Z diagonal in the modes of K?
-constexpr double zero_tolerance = 1e-13;   // of the largest: none
-constexpr double alike = 1e-12;            // two numbers
+constexpr double diagonal_tolerance = 1e-9;  // of off-diagonal elements, relative to the largest
+constexpr double zero_tolerance = 1e-13;     // relative to the largest element
+constexpr double ratio_tolerance = 1e-12;    // of two equal ratios
 
 bool is_place(const Program& program, std::uint32_t node) {
   return !program.taps.empty() && node >= program.taps[0].node;
@@ -28,7 +28,7 @@ std::vector<double> values_of(const Program& program, std::span<const double> pa
   return values;
 }
 
-// [node that moves] of its inverse mass, the root.
+// Returns the [moving node] root of the inverse mass.
 Vector roots_of(const Program& program, const std::vector<double>& value) {
   Vector root(program.moving);
   for (const MassRun& run : program.mass_runs) {
@@ -121,7 +121,8 @@ bool contains_bent_springs(const Program& program) {
 std::optional<std::vector<std::pair<double, double>>> modes_of(const Springs& springs) {
   const double most_k = std::max(largest(springs.stiffness.values), 1e-300);
   const double most_z = std::max(largest(springs.damping.values), 1e-300);
-  // Of a mixture in odd shares: modes that K alone cannot tell apart, Z may.
+  // Eigenvectors of a mixture of K and Z in an irrational ratio: it separates modes of equal
+  // stiffness but different damping.
   Matrix mixture = springs.stiffness;
   mixture.values =
       springs.stiffness.values / most_k + 0.6180339887498949 / most_z * springs.damping.values;
@@ -131,8 +132,8 @@ std::optional<std::vector<std::pair<double, double>>> modes_of(const Springs& sp
   std::vector<std::pair<double, double>> modes;
   for (std::size_t j = 0; j < k.columns(); ++j) {
     for (std::size_t i = 0; i < k.rows(); ++i) {
-      if (i != j && !(std::fabs(k(i, j)) <= shared_tolerance * most_k &&
-                      std::fabs(z(i, j)) <= shared_tolerance * most_z)) {
+      if (i != j && !(std::fabs(k(i, j)) <= diagonal_tolerance * most_k &&
+                      std::fabs(z(i, j)) <= diagonal_tolerance * most_z)) {
         return std::nullopt;
       }
     }
@@ -158,7 +159,7 @@ std::optional<Rayleigh> rayleigh_of(const Program& program, std::span<const doub
       continue;
     }
     by_stiffness = by_stiffness.value_or(z / k);
-    is_alike = is_alike && k > 0.0 && std::fabs(z - *by_stiffness * k) <= alike * z;
+    is_alike = is_alike && k > 0.0 && std::fabs(z - *by_stiffness * k) <= ratio_tolerance * z;
   }
   std::optional<double> by_mass;
   for (const MassRun& run : program.mass_runs) {
@@ -167,7 +168,8 @@ std::optional<Rayleigh> rayleigh_of(const Program& program, std::span<const doub
                           : 0.0;
     const double rate = beside * value[run.inverse_mass];
     by_mass = by_mass.value_or(rate);
-    is_alike = is_alike && std::fabs(rate - *by_mass) <= alike * (std::fabs(rate) + 1e-300);
+    is_alike =
+        is_alike && std::fabs(rate - *by_mass) <= ratio_tolerance * (std::fabs(rate) + 1e-300);
   }
   const Rayleigh found{by_mass.value_or(0.0), by_stiffness.value_or(0.0)};
   return is_alike && found.by_mass >= 0.0 && std::isfinite(found.by_stiffness)

@@ -15,7 +15,7 @@ Matrix times(double factor, Matrix matrix) {
   return matrix;
 }
 
-// v += -K x - Z v, x += v
+// Returns the matrix of one step of symplectic Euler on (x, v): v += -K x - Z v, x += v.
 Matrix step_of(const Matrix& k, const Matrix& z) {
   const std::size_t n = k.rows();
   Matrix step(2 * n, 2 * n);

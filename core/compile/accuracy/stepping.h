@@ -1,5 +1,5 @@
-// core/compile: what a form makes of a linear network in one step, as poles: logarithms of what it
-// grows by in a sample. Masses are 1, stiffness and damping per sample.
+// core/compile: the poles of a linear network as a form steps it: logarithms of the growth per
+// sample. For masses of 1, with stiffness and damping per sample.
 #pragma once
 
 #include <complex>
@@ -12,15 +12,15 @@
 
 namespace ressort::compile {
 
-// By which scheme, and how many samples at a time.
+// The scheme of a form and its time step in samples.
 struct Stepping {
   enum class Scheme { published, exact };
 
-  // What a mode that swings alone becomes; nothing where it swings no more.
+  // Returns the pole of a single mode, or nothing if it does not oscillate.
   std::optional<std::complex<double>> pole(double stiffness, double damping) const;
-  // The same of what swings together; not of the exact scheme.
+  // Returns the poles of coupled modes with a positive frequency. Not for the exact scheme.
   std::vector<std::complex<double>> poles(const Springs& springs) const;
-  // The numbers with which the published scheme does the same in a step.
+  // Returns the K and Z with which one step of the published scheme is the same.
   std::pair<Matrix, Matrix> as_published(const Springs& springs) const;
 
   Scheme scheme = Scheme::published;
@@ -31,7 +31,7 @@ struct Stepping {
 
 Stepping stepping_of(const Form& form);
 
-// Where a continuous mode swings.
+// Returns the pole of a mode of the continuous network, or nothing if it does not oscillate.
 std::optional<std::complex<double>> continuous_pole(double stiffness, double damping);
 
 }  // namespace ressort::compile

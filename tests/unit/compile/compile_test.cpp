@@ -1,4 +1,4 @@
-// From a network and a preset to an engine: what the preset may not name, and what is told.
+// Compiling a network and a preset into an engine.
 #include "core/compile/compile.h"
 
 #include "tests/support/player.h"
@@ -18,7 +18,8 @@ Error error_of(const std::string& model, const std::string& toml) {
 
 }  // namespace
 
-TEST_CASE("a preset that names what the model has not is refused with its line", "[compile]") {
+TEST_CASE("A preset that names a missing input or parameter is refused with its line",
+          "[compile]") {
   const std::string model = scenes::iplay_the_triangle();
   Error error = error_of(model, "[parameters]\nm_k = { value = 1, range = [0, 1] }");
   CHECK(error.message == "the model has no parameter 'm_k'; it has m_K, m_Z");
@@ -31,12 +32,12 @@ TEST_CASE("a preset that names what the model has not is refused with its line",
   error = error_of(scenes::poly_triangle(),
                    "[[control]]\nfrom = \"note\"\nto = \"in1\"\nhow = \"bow\"");
   CHECK(error.message == "'in1' is a force input, which this gesture cannot play");
-  // The engine keeps audio by input.
+  // The engine has an audio channel for each input.
   error = error_of(model, "[[control]]\nfrom = \"audio1\"\nto = \"m_K\"");
   CHECK(error.message == "an audio channel drives an input, not a parameter");
 }
 
-TEST_CASE("an instrument says what can be played", "[compile]") {
+TEST_CASE("An instrument lists its parameters and inputs", "[compile]") {
   Preset preset = struck(7);
   preset.parameters.push_back({"m_K", 0.2, 0.1, 0.25});
   const Player player(scenes::poly_triangle(), preset);
@@ -70,7 +71,7 @@ TEST_CASE("an instrument says what can be played", "[compile]") {
   CHECK(bowed.compiled.instrument.inputs[0].attached_to == "low_m133");
 }
 
-TEST_CASE("the plan counts the parts that hang together and says how they run", "[compile]") {
+TEST_CASE("The plan lists the connected components and their forms", "[compile]") {
   const Machine machine = make_machine(
       network_of(scenes::string("a", 5, ".1", ".1") + scenes::string("b", 3, ".1", ".1") +
                  "@p nlPluck @a_m1 @a_m3 1 1\n@free mass 1. 0. 1.\n@out1 posOutput @a_m1\n"
@@ -78,7 +79,7 @@ TEST_CASE("the plan counts the parts that hang together and says how they run", 
                  "@in2 frcInput @b_m2\n@out3 posOutput @free\n@out4 posOutput @lone\n"),
       44100.0, true);
   const Planned plan = make_plan(machine, {}, Method::direct);
-  REQUIRE(plan.parts.size() == 3);  // the largest first; what is too small, together
+  REQUIRE(plan.parts.size() == 3);  // the largest first, all small ones as one
   CHECK(plan.parts[0].masses == 5);
   CHECK(plan.parts[0].links == 7);
   CHECK(plan.parts[1].masses == 3);
@@ -94,14 +95,14 @@ TEST_CASE("the plan counts the parts that hang together and says how they run", 
   CHECK(describe(make_plan(still, {}).parts) == "nothing moves\n");
 }
 
-TEST_CASE("the plan takes the form that is cheapest at its worst", "[compile]") {
+TEST_CASE("The plan chooses the form with the lowest worst-case cost", "[compile]") {
   const auto chosen = [](const std::string& text, int voices = 1) {
     const Planned plan = make_plan(make_machine(network_of(text), 44100.0, true),
                                    {.isa = Isa::v3, .voices = voices});
     REQUIRE(plan.parts.size() == 1);
     CHECK(plan.parts[0].predicted_ns > 0.0);
     INFO(describe(plan.parts));
-    // What was chosen is what will run.
+    // The chosen form is the one that runs.
     CHECK(row_of(plan.machine.parts[0].form).method == plan.parts[0].method);
     return plan.parts[0].method;
   };
@@ -121,7 +122,7 @@ TEST_CASE("the plan takes the form that is cheapest at its worst", "[compile]") 
   CHECK(chosen(scenes::mesh_20x30()) == Method::modal);
 }
 
-TEST_CASE("a method that is asked for is taken where it can be", "[compile]") {
+TEST_CASE("A requested method is used if it can compute the part", "[compile]") {
   const Machine machine = make_machine(network_of(scenes::mesh_20x30()), 44100.0, true);
   for (const Method method : methods_for(KernelRow::Use::published)) {
     const Planned plan = make_plan(machine, {}, method);
@@ -132,27 +133,27 @@ TEST_CASE("a method that is asked for is taken where it can be", "[compile]") {
   }
 }
 
-TEST_CASE("a model without a preset is played so that a forte note peaks at half", "[compile]") {
-  // Small ones, of which a whole second is looked at.
+TEST_CASE("The gain of a model without a preset makes a forte note peak at 0.5", "[compile]") {
+  // Small models, of which a whole second is played.
   for (const std::string& text :
        {scenes::poly_triangle(), scenes::iplay_the_triangle(), ringing_string()}) {
     const Network network = network_of(text);
     Player player(text, default_preset(network, false), {.find_gain = true});
-    // As long as 4 million steps of a mass last, at most a second, in blocks of 256.
+    // 4 million steps of a mass, at most a second, in blocks of 256.
     const double masses = static_cast<double>(player.compiled.instrument.masses);
     const double frames = std::ceil(std::min(4e6 / masses, 44100.0) / 256.0) * 256.0;
     player.run(static_cast<std::size_t>(frames), {note_on(0, 60, 0.8)});
     INFO("peak " << show(peak(player.y())));
     CHECK(peak(player.y()) == Approx(0.5).epsilon(1e-9));
   }
-  // Where notes excite nothing there is nothing to go by.
+  // The gain is 1 if notes make no sound.
   const Preset silent = default_preset(network_of(scenes::resonator()), false);
   Player player(scenes::resonator(), silent, {.find_gain = true});
   player.run(44100, {note_on(0, 60, 0.8)});
   CHECK(peak(player.y()) == 0.0);
 }
 
-TEST_CASE("at another rate a network keeps its pitch and decay, unless told not to", "[compile]") {
+TEST_CASE("Rescaling keeps pitch and decay at another sample rate", "[compile]") {
   // One oscillator: r^n = (1 - z)^(n/2), theta by the closed form, at either rate.
   const std::string text = "@o osc 1. 0.001 0.0002 1. 0.\n@out1 posOutput @o\n";
   const Network network = network_of(text);

@@ -1,4 +1,4 @@
-// Hands whose ranges are in units of the model's own motion, measured as it is loaded.
+// Controls whose ranges are in swings: multiples of a loud note's displacement, measured at load.
 #include <cstdio>
 
 #include "tests/support/player.h"
@@ -8,8 +8,8 @@ namespace {
 
 using namespace support;
 
-// A string that keys strike and a felt above it, every mass and spring so many times as heavy and
-// as stiff: it swings as much less far, and a finger has to go as much less deep.
+// Returns a string with a felt above it. `times` scales every mass and stiffness, so that swings
+// and the depth of the felt shrink by it.
 std::string felted_string(double scale, const char* hand = "0.") {
   const auto times = [&](double number) {
     char text[32];
@@ -39,7 +39,7 @@ std::vector<double> struck_alone() {
 
 }  // namespace
 
-TEST_CASE("a model without a preset has a lever for every contact that no key plays", "[hands]") {
+TEST_CASE("The default preset has a control for every contact that no key plays", "[hands]") {
   const Preset preset = default_preset(network_of(felted_string(1.0)), false);
   REQUIRE(preset.controls.size() == 2);
   CHECK(preset.controls[1] == ControlSetting{.source = ControlSource::controller,
@@ -51,9 +51,9 @@ TEST_CASE("a model without a preset has a lever for every contact that no key pl
                                              .in_swings = true});
 }
 
-TEST_CASE("a lever goes from off to pressed, however heavy and stiff a model is", "[hands]") {
+TEST_CASE("A control in swings goes from off to pressed at any scale of a model", "[hands]") {
   const std::vector<double> free_string = struck_alone();
-  // By how fast it moves, as a finger that is pressed holds the string aside.
+  // Measured by the velocity, because a pressed finger displaces the string.
   const auto loss_db = [&](const std::vector<double>& y) {
     return 20.0 * std::log10(largest_step(std::span(free_string).last(10000)) /
                              largest_step(std::span(y).last(10000)));
@@ -61,7 +61,7 @@ TEST_CASE("a lever goes from off to pressed, however heavy and stiff a model is"
   std::vector<double> losses;
   for (const double scale : {1.0, 1e-3, 1e3}) {
     INFO(scale);
-    // Off is off: as if there were no hand. The gain makes all alike loud.
+    // Off sounds as without the control. The gain makes all equally loud.
     const std::vector<double> off = struck_with(scale, 0.0);
     double apart = 0.0;
     for (std::size_t n = 0; n < off.size(); ++n) {
@@ -69,7 +69,7 @@ TEST_CASE("a lever goes from off to pressed, however heavy and stiff a model is"
     }
     CHECK(apart < 1e-9);
     CHECK(peak(off) > 0.4);
-    // On the way the felt takes more and more of it, and pressed nearly all.
+    // The felt damps more and more, and nearly everything when pressed.
     double before_db = loss_db(off);
     for (const double lever : {0.5, 0.55, 0.6, 0.7}) {
       INFO(lever);
@@ -86,7 +86,7 @@ TEST_CASE("a lever goes from off to pressed, however heavy and stiff a model is"
   }
 }
 
-TEST_CASE("a swing is of a touch that touches something", "[hands]") {
+TEST_CASE("A range in swings needs a contact or a pluck", "[hands]") {
   const auto complaint = [](const std::string& model, const std::string& lines) {
     const auto parsed = parse_preset("model = \"x.mdl\"\n[[control]]\nfrom = \"cc16\"\n" + lines);
     if (!parsed.ok()) {

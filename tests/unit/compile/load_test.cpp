@@ -1,5 +1,4 @@
-// What a load costs, that it can be stopped wherever it is, and what it says when there is too
-// much.
+// The time of a load, stopping it at any stage, and the check of its memory.
 #include <algorithm>
 #include <chrono>
 #include <functional>
@@ -46,7 +45,7 @@ std::string chain(int n) {
   return text;
 }
 
-// All masses on the first.
+// Returns masses that are all linked to the first.
 std::string star(int n) {
   std::string text = masses(n);
   for (int i = 1; i < n; ++i) {
@@ -55,7 +54,7 @@ std::string star(int n) {
   return text;
 }
 
-// A chain, and every mass on its first as well, each by a spring of its own kind.
+// Returns a chain whose masses are all linked to the first one too, by different springs.
 std::string hub(int n) {
   std::string text = chain(n);
   for (int i = 2; i < n; ++i) {
@@ -64,7 +63,7 @@ std::string hub(int n) {
   return text;
 }
 
-// A chain, and beside it pairs: rows as unlike as can be.
+// Returns a chain and pairs of masses: rows of very different lengths.
 std::string comb(int n) {
   std::string text = masses(n);
   for (int i = 1; i < n; ++i) {
@@ -86,7 +85,7 @@ std::string tangle(int n) {
   return text;
 }
 
-// As many places on a string as it has masses, each held by a contact; `place` says where.
+// Returns a string with as many places as masses, each with a contact. `place`: their coordinates.
 std::string places(int n, const std::string& place) {
   std::string text = "@u param 0.3\n@s string " + std::to_string(n) +
                      " 1. 0.01 0. 0. 0.\n@g ground 0.\n@out1 posOutput [@s 0.3]\n";
@@ -96,7 +95,7 @@ std::string places(int n, const std::string& place) {
   return text;
 }
 
-// What reads and compiles it as for playing spends.
+// Returns the steps that reading and compiling a model spend.
 std::uint64_t steps_of(const std::string& text) {
   const Progress progress([](std::string_view) { return true; });
   const ParsedNetwork parsed = parse_network(text, {.progress = progress});
@@ -107,7 +106,7 @@ std::uint64_t steps_of(const std::string& text) {
   return progress.steps();
 }
 
-// Something of everything that a load looks at.
+// Returns a model with every kind of element.
 const std::string varied = [] {
   std::string text =
       chain(90) + "@u param 0.4\n@s string 30 1. K 0.001 0. 0.\n@p mesh 6 6 1. K " +
@@ -120,7 +119,7 @@ const std::string varied = [] {
 
 }  // namespace
 
-TEST_CASE("Nothing of a load grows much faster than the model", "[load]") {
+TEST_CASE("The time of a load grows hardly faster than the model", "[load]") {
   struct Shape {
     const char* name;
     std::function<std::string(int)> text;
@@ -139,8 +138,7 @@ TEST_CASE("Nothing of a load grows much faster than the model", "[load]") {
   CHECK(large < 6.0 * small);
 }
 
-TEST_CASE("What hangs together at random is judged by the bound, and has no lowest mode",
-          "[load]") {
+TEST_CASE("A large random network is checked by the edge bound and has no lowest mode", "[load]") {
   const Network network = support::network_of(tangle(4000));
   const std::vector<double> values = {0.01};
   const Progress progress([](std::string_view) { return true; });
@@ -148,13 +146,13 @@ TEST_CASE("What hangs together at random is judged by the bound, and has no lowe
   Stability stability(network, 1.0, Stability::most_exact_masses, progress);
   CHECK_FALSE(stability.is_exact());
   CHECK(stability.prove({values, values}) == Verdict::stable);
-  // A chain of as many is nothing.
+  // A chain of this size is easy.
   const Network straight = support::network_of(chain(4000));
   CHECK(lowest_mode(straight, values, progress));
   CHECK(Stability(straight, 1.0).is_exact());
 }
 
-TEST_CASE("A load can be stopped wherever it is, and nothing of it stays", "[load]") {
+TEST_CASE("A load can be stopped at any point and frees all memory", "[load]") {
   constexpr std::uint64_t steps_per_look = 1500;
   const Preset preset = [] {
     const ParsedNetwork parsed = parse_network(varied);
@@ -167,7 +165,7 @@ TEST_CASE("A load can be stopped wherever it is, and nothing of it stays", "[loa
     return default_preset(parsed.network, false);
   }();
   std::vector<std::string> stages;
-  // Stops at the look after so many; how many there were.
+  // Stops the load after this number of progress calls, and returns the number of calls.
   const auto load = [&](std::size_t most) {
     std::size_t looks = 0;
     const Progress progress(
@@ -199,7 +197,7 @@ TEST_CASE("A load can be stopped wherever it is, and nothing of it stays", "[loa
   CHECK(stages.size() == 8);
   REQUIRE(all > 100);
   REQUIRE(all < 2000);
-  load(all / 2);  // what a first time allocates for good
+  load(all / 2);  // allocates static data
   const std::size_t before = support::heap_bytes();
   for (std::size_t most = 0; most < all; ++most) {
     CHECK(load(most) == most + 1);
@@ -207,7 +205,7 @@ TEST_CASE("A load can be stopped wherever it is, and nothing of it stays", "[loa
   CHECK(support::heap_bytes() == before);
 }
 
-TEST_CASE("What an engine takes is known before it is made", "[load]") {
+TEST_CASE("The estimate of an engine's memory is within a factor of two", "[load]") {
   if (!support::heap_is_counted) {
     return;
   }
@@ -246,7 +244,7 @@ TEST_CASE("What an engine takes is known before it is made", "[load]") {
   CHECK(predicted < 2.0 * taken);
 }
 
-TEST_CASE("Voices that do not fit into memory are refused with what would fit", "[load]") {
+TEST_CASE("Voices that do not fit into memory are refused with the number that fits", "[load]") {
   const Network network = support::network_of(chain(8000));
   const Preset preset = default_preset(network, true);
   const auto compiled_in = [&](std::uint64_t most_bytes) {

@@ -15,7 +15,7 @@ using support::Random;
 using support::Score;
 using support::show;
 
-// The score as a part of the network hears it, which has some of the hands.
+// Returns the score for a part of the network, which has some of the inputs.
 Score score_for(const Program& part, const Program& whole, const Score& score) {
   Score some = score;
   for (std::size_t n = 0; n < score.inputs.size(); ++n) {
@@ -31,7 +31,7 @@ Score score_for(const Program& part, const Program& whole, const Score& score) {
   return some;
 }
 
-// [channel][frame], of the whole network as one or of the parts that are left.
+// [channel][frame] output of the whole network or of its remaining parts.
 using Sound = std::vector<std::vector<double>>;
 
 void add(Sound& sound, const Program& program, const Score& score) {
@@ -42,7 +42,8 @@ void add(Sound& sound, const Program& program, const Score& score) {
   }
 }
 
-// Masses that no output hears: on a ground, on a hand, on both sides of a damper without strength.
+// Returns masses that no output hears: on a ground, on a position input and behind a link without
+// strength.
 std::string unheard(Random& random) {
   std::string text;
   std::string before = random.below(2) == 0 ? "@g0" : "@in60";
@@ -90,21 +91,21 @@ TEST_CASE("A mass that no output hears is left out", "[reduce]") {
   const std::string pair =
       "@g ground 0.\n@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n@s springDamper @a @b .1 0.\n"
       "@out1 posOutput @b\n";
-  CHECK(said(pair) == "");  // it may be struck
+  CHECK(said(pair) == "");  // a mass may be struck
   CHECK(said(pair + "@in1 frcInput @a\n") == "");
   CHECK(said(pair + "@in1 posInput 0.\n@t springDamper @in1 @a .1 0.\n") == "");
-  // What stands between is a ground, which passes nothing on...
+  // A ground passes no motion on...
   const std::string heard = pair + "@in1 frcInput @a\n@c mass 1. 0. .1\n";
   CHECK(said(heard + "@t springDamper @g @c .1 0.\n@u springDamper @g @a .1 0.\n") ==
         "1 mass that no output hears");
-  // ...unless somebody listens to the force on it.
+  // ...but an output may hear the force on it.
   CHECK(said(heard + "@t springDamper @g @c .1 0.\n@out2 frcOutput @g\n") == "");
-  // A link without any strength ties nothing; one whose strength is a parameter does.
+  // A link without strength connects nothing; one whose strength is a parameter does.
   CHECK(said(heard + "@t springDamper @a @c 0. 0.\n") ==
-        "1 mass that no output hears, 1 link that exerts nothing");
+        "1 mass that no output hears, 1 link without strength");
   CHECK(said(heard + "@z param 0.\n@t springDamper @a @c z 0.\n") == "");
   CHECK(said(heard + "@t nlPluck @a @c 0. .1 0.\n") ==
-        "1 mass that no output hears, 1 link that exerts nothing");
+        "1 mass that no output hears, 1 link without strength");
 }
 
 TEST_CASE("Parallel springs are merged into one", "[reduce]") {

@@ -1,4 +1,4 @@
-// The stages of compiling, each by itself, on networks small enough to be solved by hand.
+// Each stage of compiling by itself, on networks small enough to solve by hand.
 #include "core/analysis/linear.h"
 #include "core/compile/accuracy/pitches.h"
 #include "core/compile/instrument.h"
@@ -27,7 +27,7 @@ ParameterBox at(double value) {
 
 }  // namespace
 
-TEST_CASE("without a preset a parameter may be turned to four times its value", "[stages]") {
+TEST_CASE("The default range of a parameter ends at four times its value", "[stages]") {
   const Network network = network_of(
       "@a param 0.3\n@b param -2\n@c param 0\n@M param 8\n@g ground 0.\n@o osc M a b 0. 0.\n@s "
       "spring @g @o c\n@out1 posOutput @o\n");
@@ -36,12 +36,12 @@ TEST_CASE("without a preset a parameter may be turned to four times its value", 
   CHECK(range(0) == std::pair(0.0, 1.2));
   CHECK(range(1) == std::pair(-8.0, 8.0));
   CHECK(range(2) == std::pair(0.0, 1.0));
-  CHECK(range(3) == std::pair(2.0, 32.0));  // nothing may become weightless
+  CHECK(range(3) == std::pair(2.0, 32.0));  // a mass must not become 0
   CHECK(start_values(asked, {{"b", 7.0}}, false) == std::vector{0.3, -2.0, 0.0, 8.0});
   CHECK(start_values(asked, {{"b", 7.0}}, true) == std::vector{0.3, 7.0, 0.0, 8.0});
 }
 
-TEST_CASE("a formula that is no number is told where it stands", "[stages]") {
+TEST_CASE("A formula that is not finite is reported at its line", "[stages]") {
   const Network network = network_of("@P param 1\n@o osc 1. 1/P 0. 0. 0.\n@out1 posOutput @o\n");
   CHECK_FALSE(find_invalid_number(network, std::vector{1.0}, 1.0));
   const auto error = find_invalid_number(network, std::vector{0.0}, 1.0);
@@ -53,7 +53,7 @@ TEST_CASE("a formula that is no number is told where it stands", "[stages]") {
   CHECK(find_invalid_number(network, std::vector{1e-308}, 2.0));
 }
 
-TEST_CASE("a mode that no number keeps is told", "[stages]") {
+TEST_CASE("A mode whose coefficients overflow is reported", "[stages]") {
   const auto told = [](const std::string& mass, const std::string& mode) {
     const Network network =
         network_of("@b body " + mass + " p\n@b1 mode @b " + mode + " 1.\n@out1 posOutput [@b p]\n");
@@ -67,7 +67,7 @@ TEST_CASE("a mode that no number keeps is told", "[stages]") {
   CHECK(told("1.", "300. 1e-160") == "the T60 1e-160 of 'b1' is too short");
 }
 
-TEST_CASE("tables leave out what was culled and start where they are told to", "[stages]") {
+TEST_CASE("Tables leave out culled masses and start at the given values", "[stages]") {
   const Network network = network_of(held_mass + "@lost mass 1. 0. 1.\n");
   const Machine machine = tabulate(network, cull(network), {}, std::vector{0.7}, 88200.0, true);
   CHECK(machine.rate_ratio == 0.5);
@@ -87,7 +87,7 @@ TEST_CASE("tables leave out what was culled and start where they are told to", "
   CHECK(value(1) == Approx(0.05).epsilon(1e-15));
 }
 
-TEST_CASE("a range is narrowed to what is stable, and nobody else's", "[stages]") {
+TEST_CASE("An unstable range is narrowed, and the request stays unchanged", "[stages]") {
   const Network network = network_of(held_mass);
   Preset preset = struck(1);
   preset.parameters.push_back({"K", 0.5, 0.1, 9.0, {7, 3}});
@@ -99,7 +99,7 @@ TEST_CASE("a range is narrowed to what is stable, and nobody else's", "[stages]"
                                                 .start = std::vector{0.5},
                                                 .reach = {}});
   CHECK(check.verdict == Verdict::stable);
-  // 4M - 2Z = 7.8, told in six digits from within.
+  // 4M - 2Z = 7.8, rounded inwards to six digits.
   CHECK(check.parameters[0].maximum == 7.79999);
   CHECK(check.parameters[0].minimum == 0.1);
   CHECK(check.limits[0].highest == 7.79999);
@@ -110,7 +110,7 @@ TEST_CASE("a range is narrowed to what is stable, and nobody else's", "[stages]"
   CHECK(preset_box(asked, preset).highest[0] == 9.0);
 }
 
-TEST_CASE("what keys may use of the stiffness shrinks on the way to the limits", "[stages]") {
+TEST_CASE("The margin for keys shrinks towards the limits of a parameter", "[stages]") {
   const Network network = network_of(held_mass);
   const std::vector<Limits> limits = {{-infinity, 1.0}};
   const Margins margins = find_margins(network, {}, at(0.5), limits, 1.0);
@@ -125,14 +125,14 @@ TEST_CASE("what keys may use of the stiffness shrinks on the way to the limits",
   // At half the rate K counts four times, Z twice.
   CHECK(find_margins(network, {}, at(0.5), {}, 2.0).whole == Approx(7.6 / 2.0).epsilon(1e-12));
   CHECK(find_margins(network, {}, at(0.5), {}, 1.0).away.empty());
-  // What is passive limits nothing.
+  // Passive links limit nothing.
   const Network floor = network_of("@g ground 0.\n@m mass 1. 0. 1.\n@c contact @g @m 3. 0.\n");
   const std::vector<LinkScheme> passive = {{Scheme::discrete_gradient}};
   CHECK(find_margins(floor, {}, {}, {}, 1.0).whole == Approx(4.0 / 3.0).epsilon(1e-12));
   CHECK(find_margins(floor, passive, {}, {}, 1.0).whole == most_bounded);
 }
 
-TEST_CASE("a part that nothing stirs is bound by how far its springs give way", "[stages]") {
+TEST_CASE("The bound of a resting part is the compliance of its springs", "[stages]") {
   const Network network = network_of(
       "@g ground 0.\n@m mass 1. 0. 1.\n@n mass 1. 0. 0.\n@a spring @g @m 0.5\n"
       "@b spring @m @n 0.25\n@out1 posOutput @m\n@out2 posOutput @n\n@out3 frcOutput @g\n");
@@ -144,13 +144,13 @@ TEST_CASE("a part that nothing stirs is bound by how far its springs give way", 
   silent.outputs.pop_back();
   const auto bound = bounds(silent)[0];
   REQUIRE(bound);
-  // In series: 1/0.5, and 1/0.5 + 1/0.25.
+  // Springs in series: 1/0.5, and 1/0.5 + 1/0.25.
   REQUIRE(bound->compliances.size() == 2);
   CHECK(bound->compliances[0] == Approx(2.0).epsilon(1e-12));
   CHECK(bound->compliances[1] == Approx(6.0).epsilon(1e-12));
 }
 
-TEST_CASE("keys know the lowest mode in samples of the engine's own rate", "[stages]") {
+TEST_CASE("Keys tune the lowest mode at the engine's sample rate", "[stages]") {
   const Network network = network_of(held_mass);
   const auto shapes = lowest_shapes(network, std::vector{0.5});
   REQUIRE(shapes);
@@ -176,7 +176,7 @@ TEST_CASE("keys know the lowest mode in samples of the engine's own rate", "[sta
   CHECK(make_playing(network, struck(1), proof, {}, false, 3, 0.25).tuning == Tuning::fixed);
 }
 
-TEST_CASE("the gain of a blow on one mass is what its height asks for", "[stages]") {
+TEST_CASE("The gain found for an impulse on one mass follows from its amplitude", "[stages]") {
   // K = 2 M: x[n+1] = -x[n-1]. A blow of 0.1 of a force, at velocity 0.8, moves M = 1 by 0.08.
   const Network network =
       network_of("@o osc 1. 2. 0. 0. 0.\n@in1 frcInput @o\n@out1 posOutput @o\n");
