@@ -265,7 +265,7 @@ TEST_CASE("no cluster of links has more energy than was put in", "[clusters]") {
   CHECK(exploded > 60);
 }
 
-TEST_CASE("what loses nothing keeps all of its energy, however many links share it", "[clusters]") {
+TEST_CASE("lossless networks conserve energy with any number of links at a mass", "[clusters]") {
   // Every mass by a law to every other and to a wall; chains; cradles whose balls touch from the
   // start on. As it is the start, too, that must not lose: within a thousandth of what a hand
   // brought along.
@@ -310,7 +310,7 @@ TEST_CASE("what loses nothing keeps all of its energy, however many links share 
   }
 }
 
-TEST_CASE("what starts at the edge of a wall is held in its first sample", "[clusters]") {
+TEST_CASE("a mass that starts inside a wall is held in its first sample", "[clusters]") {
   // At 0.01 a sample from 0.001 before a wall of K/M = 10^4: elastic, so it leaves as it came, and
   // is never deeper than v/sqrt(K/M) from where two samples' mean of its potential is v^2/2.
   EnergyJudge ball(

@@ -165,15 +165,15 @@ void check_networks(const std::vector<Isa>& isas) {
 
 }  // namespace
 
-TEST_CASE("every form of a random network moves as it is written", "[forms]") {
+TEST_CASE("every kernel plays random networks like the direct form", "[forms]") {
   check_networks({best_isa()});
 }
 
-TEST_CASE("and on every instruction set", "[.][forms_everywhere]") {
+TEST_CASE("every kernel agrees on every instruction set", "[.][forms_everywhere]") {
   check_networks(support::isas());
 }
 
-TEST_CASE("a bow's profile is turned while it sounds, in every form that can hold it", "[forms]") {
+TEST_CASE("a bow's profile changes while it plays, in every kernel that supports it", "[forms]") {
   std::set<Method> taken;
   for (const auto& [body, bowed, heard] :
        {std::tuple{scenes::string("s", 12, "0.1", "0.003"), "@s_m4", "s_m8"},

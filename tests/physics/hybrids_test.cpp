@@ -231,8 +231,7 @@ std::string one_of_three(int i) {
 
 }  // namespace
 
-TEST_CASE("what holds masses, places and waveguides together keeps the books of energy",
-          "[hybrids]") {
+TEST_CASE("links between masses, places and waveguides balance the energy", "[hybrids]") {
   double worst = 0.0;
   for (const End& a : ends) {
     for (const End& b : ends) {
@@ -272,7 +271,7 @@ TEST_CASE("what holds masses, places and waveguides together keeps the books of 
   CAPTURE(worst);
 }
 
-TEST_CASE("what was plucked, bowed or touched keeps its energy once it is let go", "[hybrids]") {
+TEST_CASE("a released string keeps its energy after a pluck, bow or contact", "[hybrids]") {
   // A hand that sweeps past, one that draws and then outruns all friction, one that pushes and
   // leaves: where it is in sample n. Nothing else takes anything, for ten seconds.
   static constexpr int let_go = 22050;
@@ -345,7 +344,7 @@ TEST_CASE("several links at a place on a waveguide are solved together", "[hybri
   }
 }
 
-TEST_CASE("the published laws make energy at a waveguide, the engine's do not", "[hybrids]") {
+TEST_CASE("the published laws gain energy at a waveguide, the passive ones do not", "[hybrids]") {
   for (const std::string link : {"@k spring [@w 0.31] @m 2.", "@k contact [@w 0.31] @m 2. 0. 0.01",
                                  "@k nlSpring3 [@w 0.31] @m 0.5 300. 0."}) {
     const std::string text = "@w waveguide 0.8 613. 1e30 1. 0.\n@m mass 2. 0. 0.\n" + link +
@@ -364,7 +363,7 @@ TEST_CASE("the published laws make energy at a waveguide, the engine's do not", 
   }
 }
 
-TEST_CASE("a damper between waveguides takes what it rubs, and no more", "[hybrids]") {
+TEST_CASE("a damper between waveguides removes exactly its friction loss", "[hybrids]") {
   Books books(
       "@a waveguide 0.6 517. 1e30 1. 0.\n@b waveguide 1.9 389. 1e30 1. 0.\n"
       "@z damper [@a 0.3] [@b 0.7] 0.8\n"
@@ -382,7 +381,7 @@ TEST_CASE("a damper between waveguides takes what it rubs, and no more", "[hybri
   CHECK(last < 0.5 * most);
 }
 
-TEST_CASE("links at few places are solved by the places", "[hybrids]") {
+TEST_CASE("clusters with few places are solved by the places", "[hybrids]") {
   // By its links a crowd needs 2 N^2 numbers a lane, here 6.4 GB; by three places
   // and N/7 masses what each link and each mass needs.
   constexpr int many = 20'000;
@@ -403,7 +402,7 @@ TEST_CASE("links at few places are solved by the places", "[hybrids]") {
   CHECK(off_books(crowd(12, one_of_three)) < 1e-12);
 }
 
-TEST_CASE("by the places they move as by the links", "[hybrids]") {
+TEST_CASE("the solutions by places and by links agree", "[hybrids]") {
   // Places that each are a parameter of their own are many, though all of them are at one.
   const std::string by_place = crowd(12, [](int) { return std::string("[@s u1]"); });
   const std::string by_link = crowd(12, [](int i) { return "[@s u" + std::to_string(i) + "]"; });
@@ -429,7 +428,7 @@ TEST_CASE("by the places they move as by the links", "[hybrids]") {
   CHECK(off < 1e-12 * most);
 }
 
-TEST_CASE("any links among few places keep the books of energy", "[hybrids]") {
+TEST_CASE("any links among few places balance the energy", "[hybrids]") {
   // Among three places of a body that has two modes, so that one goes with the others, two of a
   // string, one of a waveguide, two masses and the ground.
   constexpr std::array<const char*, 9> held = {

@@ -185,7 +185,7 @@ void abuse(Ledger& ledger, std::uint64_t seed, int frames) {
 
 }  // namespace
 
-TEST_CASE("no abuse gets more energy out of passive links than was put in", "[ledger]") {
+TEST_CASE("passive links gain no energy under any input", "[ledger]") {
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
     const std::string text = abused(seed);
     INFO("seed " << seed << "\n" << text);
@@ -198,7 +198,7 @@ TEST_CASE("no abuse gets more energy out of passive links than was put in", "[le
   }
 }
 
-TEST_CASE("as published, the same abuse makes energy without end", "[ledger]") {
+TEST_CASE("the published laws gain energy without limit under the same inputs", "[ledger]") {
   int exploded = 0;
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
     Ledger ledger(abused(seed), Passivity::never);
@@ -208,7 +208,7 @@ TEST_CASE("as published, the same abuse makes energy without end", "[ledger]") {
   CHECK(exploded > 40);
 }
 
-TEST_CASE("one contact as published is enough to gain energy", "[ledger]") {
+TEST_CASE("a single published contact gains energy", "[ledger]") {
   const std::string text =
       "@w ground 0.\n@in1 posInput -2.\n@in2 posInput 0.1\n@out1 frcOutput @in1\n"
       "@out2 frcOutput @in2\n@m0 mass 1. 0. 0.\n@s springDamper @w @m0 0.001 0.0001\n"

@@ -53,7 +53,7 @@ TEST_CASE("a string on a stiff bridge is in tune at every key", "[loaded_wavegui
   }
 }
 
-TEST_CASE("masses and springs on a waveguide do not untune it", "[loaded_waveguide]") {
+TEST_CASE("masses and springs on a waveguide keep it in tune", "[loaded_waveguide]") {
   const std::string loads[] = {
       // a mass and a plain spring elsewhere in the same network
       "@m mass 8. 0. 0.\n@k spring [@s 0.31] @m 0.3 0.001\n@g ground 0.\n@h spring @m @g 0.2\n",

@@ -265,7 +265,7 @@ struct Show {
 
 }  // namespace
 
-TEST_CASE("models are swapped while the methods differ", "[methods]") {
+TEST_CASE("models with different kernels are swapped", "[methods]") {
   const std::vector<Subject> all = subjects();
   Show plain;
   Show mixed;
@@ -289,7 +289,7 @@ TEST_CASE("models are swapped while the methods differ", "[methods]") {
   check_double(Method::modal, outputs);
 }
 
-TEST_CASE("every method plays an instrument as the direct one does", "[methods]") {
+TEST_CASE("every kernel plays an instrument like the direct one", "[methods]") {
   for (const Subject& subject : subjects()) {
     INFO(subject.name << "\n" << subject.text);
     check_methods(subject, false, 1);

@@ -59,7 +59,7 @@ TEST_CASE("the published scheme has a pitch error of second order and a decay er
   CHECK(order("0.001", &PoleErrors::decay) == Approx(1.0).margin(.1));
 }
 
-TEST_CASE("what bends, touches and rubs is of the order that is said", "[orders]") {
+TEST_CASE("springs, contacts and friction converge with the stated order", "[orders]") {
   struct Case {
     const char* link;
     double passive;

@@ -86,7 +86,7 @@ double blows_up_at(const std::string& law, const std::string& arguments) {
 
 }  // namespace
 
-TEST_CASE("S08, T10: a ball leaves a wall as fast as it came, however hard that is", "[passive]") {
+TEST_CASE("S08, T10: a ball leaves a lossless wall at the speed it came with", "[passive]") {
   // Reference: 1, exactly. As published the speed depends on where between two samples it touches.
   struct Row {
     double k;
@@ -116,7 +116,7 @@ TEST_CASE("S08, T10: a ball leaves a wall as fast as it came, however hard that 
   }
 }
 
-TEST_CASE("S09, T12: a damped wall takes what it should", "[passive]") {
+TEST_CASE("S09, T12: a damped wall dissipates the correct energy", "[passive]") {
   // Reference: the wall lets go where it began, so e = exp(-pi xi/sqrt(1 - xi^2)).
   const auto closed = [](double k, double z) {
     const double xi = z / (2.0 * std::sqrt(k));
@@ -193,7 +193,7 @@ TEST_CASE("S11: a damped ball comes to rest", "[passive]") {
   }
 }
 
-TEST_CASE("S05: a cubic spring may be bent as far as one likes", "[passive]") {
+TEST_CASE("S05: a cubic spring is stable at any amplitude", "[passive]") {
   // Reference: bounded, by its energy. As published it blows up at these amplitudes.
   const std::vector<std::pair<double, double>> published = {
       {0., .771}, {.1, .806}, {1., .635}, {2., .593}};
@@ -221,7 +221,7 @@ TEST_CASE("S05: a cubic spring may be bent as far as one likes", "[passive]") {
   }
 }
 
-TEST_CASE("S06: a quadratic spring may be bent as far as one likes", "[passive]") {
+TEST_CASE("S06: a quadratic spring is stable at any amplitude", "[passive]") {
   const std::vector<std::pair<double, double>> published = {
       {0., 1.186}, {.1, 1.104}, {1., .564}, {2., .575}};
   for (const auto& [k, amplitude] : published) {
@@ -249,7 +249,7 @@ TEST_CASE("S06: a quadratic spring may be bent as far as one likes", "[passive]"
   }
 }
 
-TEST_CASE("S07, T13: a Duffing oscillator keeps its period when it swings little", "[passive]") {
+TEST_CASE("S07, T13: a Duffing oscillator has its linear period at small amplitudes", "[passive]") {
   // Reference: elliptic periods. By its discrete gradient it is flat when it swings far; never
   // unstable.
   struct Row {
@@ -297,7 +297,7 @@ TEST_CASE("S07, T13: a Duffing oscillator keeps its period when it swings little
   CHECK(!(std::fabs(published.x[0]) < 1e6));
 }
 
-TEST_CASE("S20: a clipped spring has no step, and gives back no more than it got", "[passive]") {
+TEST_CASE("S20: a clipped spring is continuous and gains no energy", "[passive]") {
   // s = .01, c = 10, k = .5 without damping, from .2, which is below b = sqrt((k - s)/c) = .2214.
   const double b = std::sqrt(.49 / 10.0);
   const laws::ClippedSpring<double> spring{.01, 10., .5, 0.};
@@ -327,7 +327,7 @@ TEST_CASE("S20: a clipped spring has no step, and gives back no more than it got
   CHECK(std::fabs(far.x[0]) < b * 1.1);
 }
 
-TEST_CASE("a point on a macro is hit as the mass that it lies on", "[passive]") {
+TEST_CASE("a strike at a point on a mass equals a strike of that mass", "[passive]") {
   const std::string rest = "@w ground -0.001\n@out1 posOutput ";
   Stepper<double> masses(scenes::string("s", 9, "0.1", "0.001") +
                              "@c contact @w @s_m4 5. 0.1\n@in1 frcInput @s_m2\n" + rest + "@s_m6\n",
@@ -347,7 +347,7 @@ TEST_CASE("a point on a macro is hit as the mass that it lies on", "[passive]") 
   CHECK(difference.relative() < 1e-11);
 }
 
-TEST_CASE("the force on a ball is what changes its speed", "[passive]") {
+TEST_CASE("the force on a ball equals its change of momentum", "[passive]") {
   Stepper<double> ball(
       "@w ground 0.\n@b mass 1. 0. 0.\n@c contact @w @b 3. 0.2\n@out1 frcOutput @b\n"
       "@out2 frcOutput @w\n",
@@ -365,7 +365,7 @@ TEST_CASE("the force on a ball is what changes its speed", "[passive]") {
   CHECK(most > .1);
 }
 
-TEST_CASE("what is next to nothing is a number for every law", "[passive]") {
+TEST_CASE("every law is finite at tiny distances", "[passive]") {
   // Waves set in with numbers whose squares vanish; with a stiffness of 0 too.
   Random random(3);
   for (std::size_t i = 0; i < law_count; ++i) {
@@ -394,7 +394,7 @@ TEST_CASE("what is next to nothing is a number for every law", "[passive]") {
   }
 }
 
-TEST_CASE("all that no theorem covers is made passive, and told", "[passive]") {
+TEST_CASE("links without a stability proof are made passive, with a note", "[passive]") {
   const std::string text =
       "@k param 0.05\n@g ground 0.\n@in1 posInput 0.\n@m mass 1. 0.5 0.5\n@n mass 1. 0.5 0.5\n"
       "@s spring @g @m 0.1\n@c1 contact @g @m k 0.01\n@c2 contact @g @n 0. 0.\n"
@@ -481,7 +481,7 @@ TEST_CASE("a passive law depends on no other lane", "[passive]") {
   }
 }
 
-TEST_CASE("a bow of either profile is the one or the other, bit for bit", "[passive]") {
+TEST_CASE("a bow's profile parameter reproduces both profiles bit for bit", "[passive]") {
   using V = Pack<double, 16>;
   Random random(8);
   for (int i = 0; i < 2000; ++i) {
@@ -511,7 +511,7 @@ TEST_CASE("a bow of either profile is the one or the other, bit for bit", "[pass
 
 // A finger that rests on a string at rest is on the very top of the hill, however steep: nothing
 // moves by itself. What is pushed ever so little goes down.
-TEST_CASE("what rests on the top of a pluck stays there", "[passive]") {
+TEST_CASE("a mass at rest on the top of a pluck stays there", "[passive]") {
   const std::string mass = "@g ground 0.\n@b mass 1. 0. 0.\n";
   for (const double k : {0.1, 1.0, 3.0, 1000.0}) {
     INFO("K " << k);

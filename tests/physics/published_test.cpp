@@ -86,7 +86,7 @@ struct Quadratised {
 
 }  // namespace
 
-TEST_CASE("a ball is on a wall as long as its power law says", "[published]") {
+TEST_CASE("a ball's contact time on a wall follows its power law", "[published]") {
   // 1/2 v^2 = K/(P+1) D^(P+1), and 2 D/v times the integral of du/sqrt(1 - u^(P+1)) from 0 to 1: a
   // half period for P = 1; 2.943275 D/v for P = 1.5 (Hertz 1882). Without losses it leaves as fast
   // as it came, whatever the stiffness (Chatziioannou and van Walstijn 2015).
@@ -109,7 +109,7 @@ TEST_CASE("a ball is on a wall as long as its power law says", "[published]") {
   }
 }
 
-TEST_CASE("no power law gains anything at any stiffness", "[published]") {
+TEST_CASE("no power-law contact gains energy at any stiffness", "[published]") {
   // Bilbao, Torin and Chatziioannou 2015: the energy stays to rounding, from soft to rigid.
   for (const double p : {1.0, 1.3, 1.5, 2.3, 3.5}) {
     for (double k = 1e-3; k < 1e9; k *= 10.0) {
@@ -125,7 +125,7 @@ TEST_CASE("no power law gains anything at any stiffness", "[published]") {
   CHECK(fly(0.3, 1e4, 1.5, 0.0, Passivity::never).gain > 2.0);
 }
 
-TEST_CASE("a damped contact gives back what Hunt and Crossley find", "[published]") {
+TEST_CASE("a damped contact restores the energy of Hunt and Crossley's model", "[published]") {
   // With L = Z/K the speeds in and out obey the same integral of v dv/(K +- Z v), whatever P
   // (Hunt and Crossley 1975): v/L - ln(1 + L v)/L^2 in, -w/L - ln(1 - L w)/L^2 out.
   for (const double p : {1.0, 1.5, 2.3}) {
@@ -148,8 +148,7 @@ TEST_CASE("a damped contact gives back what Hunt and Crossley find", "[published
   }
 }
 
-TEST_CASE("a string that swings against a point in its middle sounds a fourth higher",
-          "[published]") {
+TEST_CASE("a string against a midpoint stop sounds a fourth higher", "[published]") {
   // Half of the period it swings as a whole, which takes 1/2 T; then as two halves, each for a
   // period of its own of 1/2 T / 2: 3/4 T in all (Cabannes 1984; Issanchou et al. 2017). On equal
   // masses with K = M waves travel undispersed: T = 2 (N + 1) samples.
@@ -186,7 +185,7 @@ TEST_CASE("a string that swings against a point in its middle sounds a fourth hi
   CHECK(best == Approx(.75 * period).margin(2.0));
 }
 
-TEST_CASE("a bowed string moves as Helmholtz saw it", "[published]") {
+TEST_CASE("a bowed string shows Helmholtz motion", "[published]") {
   // At a share b of its length it goes with the bow for 1 - b of its period and against it for b,
   // once a period of 2 (N + 1) sqrt(M/K) samples (Helmholtz 1863;
   // Desvages and Bilbao 2016). What is here of round corners, friction that gives way a little as
@@ -229,7 +228,8 @@ TEST_CASE("a bowed string moves as Helmholtz saw it", "[published]") {
   }
 }
 
-TEST_CASE("quadratised and by its discrete gradient, a ball hits a wall alike", "[published]") {
+TEST_CASE("the auxiliary-variable and discrete-gradient schemes agree for a ball on a wall",
+          "[published]") {
   // Ducceschi et al. 2021: without iteration the ball goes the same way but for an error of second
   // order in the step, and leaves as fast as it came.
   const double v = 1e-3;
@@ -268,7 +268,7 @@ TEST_CASE("quadratised and by its discrete gradient, a ball hits a wall alike", 
   }
 }
 
-TEST_CASE("a number of its own drifts from the potential that it stands for", "[published]") {
+TEST_CASE("the scalar auxiliary variable drifts from its potential", "[published]") {
   // psi - sqrt(2 P(x)) of a hard spring, q x^3: nothing brings it back but a smaller step, its
   // square (van Walstijn et al. 2024; Bilbao, Ducceschi and Zama 2023). It keeps its own energy to
   // rounding and misses that of the spring; a discrete gradient has the spring's in its books.
@@ -307,7 +307,7 @@ TEST_CASE("a number of its own drifts from the potential that it stands for", "[
   }
 }
 
-TEST_CASE("what a bow does is what the string gets and what is rubbed off", "[published]") {
+TEST_CASE("a bow's work equals the string's energy plus friction loss", "[published]") {
   // Desvages and Bilbao 2016: the string's energy grows by f v_bow - f (v_bow - v), f being the
   // friction at the mean of two samples' speeds: here over 40,000 samples in which it is bowed,
   // faster and slower, and to and fro, of K/M = 0.8.

@@ -499,7 +499,7 @@ Outcome play(const NonlinearScene& scene, Passivity passive, std::size_t frames)
 
 }  // namespace
 
-TEST_CASE("no scene makes energy as it is played", "[scenes]") {
+TEST_CASE("no scene gains energy as played", "[scenes]") {
   const char* const asked = std::getenv("RESSORT_SCENES");  // FIRST,COUNT,FRAMES[,LINKS]
   unsigned long long seed = 1;
   unsigned long long count = 150;
@@ -533,7 +533,7 @@ TEST_CASE("no scene makes energy as it is played", "[scenes]") {
   CHECK(failed == 0);
 }
 
-TEST_CASE("no scene that once made energy, or lost its voice, does so again", "[scenes]") {
+TEST_CASE("scenes that once gained energy or fell silent stay fixed", "[scenes]") {
   // Of 40,000. A force of 1e5 that meets a cubic spring of K/M = 1e6; a pluck of 1e6 whose edge a
   // mass comes to rest at; 181 bows on one mass.
   for (const std::uint64_t seed :
@@ -546,7 +546,7 @@ TEST_CASE("no scene that once made energy, or lost its voice, does so again", "[
   }
 }
 
-TEST_CASE("as published, many of the same scenes do", "[scenes]") {
+TEST_CASE("the published scheme gains energy in many of the same scenes", "[scenes]") {
   int failed = 0;
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
     const Outcome outcome = play(random_scene(seed), Passivity::never, 1024);

@@ -263,8 +263,7 @@ std::vector<double> struck_string(Program program, double k, int frames, Spread*
 
 }  // namespace
 
-TEST_CASE("S14, T14: a pluck snaps as it should, as nearly as one step a sample can tell",
-          "[stress_contacts]") {
+TEST_CASE("S14, T14: a pluck releases at the correct point, to one step", "[stress_contacts]") {
   // Reference: Runge-Kutta at 200 to 1000 steps a sample.
   for (const double k : {.05, .5, 5., 40., 400.}) {
     for (const double speed : {1e-4, 1e-3, 5e-3, 1e-2}) {
@@ -291,7 +290,7 @@ TEST_CASE("S14, T14: a pluck snaps as it should, as nearly as one step a sample 
   CHECK(plucked(400., 1e-4, Passivity::never) > 5.0 * plucked_finely(400., 1e-4));
 }
 
-TEST_CASE("S15, T15: a strong bow grips as it should", "[stress_contacts]") {
+TEST_CASE("S15, T15: a strong bow sticks as it should", "[stress_contacts]") {
   // Reference: Runge-Kutta at 50 steps a sample, as tabled. Above Z = 3 M there are several speeds
   // at which friction and inertia agree; one sample cannot tell when such a bow lets go, and it
   // lets go too early, without gaining anything: bows that hard need a higher rate.
@@ -325,8 +324,7 @@ TEST_CASE("S15, T15: a strong bow grips as it should", "[stress_contacts]") {
   CHECK(bowed(2.9, Passivity::never).rms > 1.9 * bowed_finely(2.9).rms);
 }
 
-TEST_CASE("S15: a bow of any strength grips as it should in steps of Z below 3 M",
-          "[stress_contacts]") {
+TEST_CASE("S15: a bow of any strength sticks with steps of Z below 3 M", "[stress_contacts]") {
   // Reference: Runge-Kutta at 50 steps a sample. Z per step is Z over the number of steps.
   struct Row {
     double z;

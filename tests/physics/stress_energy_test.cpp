@@ -152,7 +152,7 @@ TEST_CASE("S04: a damper against the ground", "[stress_energy]") {
   CHECK(std::pow(2.0, 20) == Approx(1.05e6).epsilon(2e-3));
 }
 
-TEST_CASE("S12: a jump of stiffness adds what the scheme's own formula says", "[stress_energy]") {
+TEST_CASE("S12: a jump of stiffness adds the energy of the scheme's formula", "[stress_energy]") {
   const auto jumped = [](int after, double& formula) {
     Lab lab("@k param 0.1\n@m osc 1. k 0. 0. 0.\n@out1 posOutput @m\n");
     lab.set_state({1.0}, {0.0});
@@ -179,7 +179,7 @@ TEST_CASE("S12: a jump of stiffness adds what the scheme's own formula says", "[
   }
 }
 
-TEST_CASE("S12: a slow ramp of stiffness ends where the action says", "[stress_energy]") {
+TEST_CASE("S12: a slow ramp of stiffness conserves the action", "[stress_energy]") {
   const auto ramped = [](std::size_t frames, double& least, double& most) {
     least = 1e9;
     most = 0.0;
@@ -217,7 +217,7 @@ TEST_CASE("S12: a slow ramp of stiffness ends where the action says", "[stress_e
   CHECK(sine(1.0) / sine(0.1) == Approx(2.7735).epsilon(1e-4));
 }
 
-TEST_CASE("S21: a hand that jumps strikes by its damper", "[stress_energy]") {
+TEST_CASE("S21: a jump of a position input strikes through its damper", "[stress_energy]") {
   Lab lab(
       "@in1 posInput 0.\n@m mass 1. 0. 0.\n@s springDamper @in1 @m 0.1 0.5\n"
       "@out1 posOutput @m\n");
@@ -234,7 +234,8 @@ TEST_CASE("S21: a hand that jumps strikes by its damper", "[stress_energy]") {
   CHECK(most == Approx(1.2114).epsilon(1e-4));
 }
 
-TEST_CASE("S23: a stiffness turned at twice the pitch feeds it, as in nature", "[stress_energy]") {
+TEST_CASE("S23: a stiffness modulated at twice the pitch causes parametric growth",
+          "[stress_energy]") {
   struct Row {
     double z, growth;
   };
@@ -258,7 +259,7 @@ TEST_CASE("S23: a stiffness turned at twice the pitch feeds it, as in nature", "
   }
 }
 
-TEST_CASE("S10: a ball that bounces on a plain contact gains without end", "[stress_energy]") {
+TEST_CASE("S10: a ball on a published contact gains energy without limit", "[stress_energy]") {
   // By how much is chaotic: another order of the same sums gives 147 or 788 where this gives 388.
   struct Row {
     double k, least;

@@ -70,7 +70,7 @@ void check_around(const std::string& text, const std::string& name, double limit
 
 }  // namespace
 
-TEST_CASE("T2: each limit is where theory has it, and simulation beyond it diverges",
+TEST_CASE("T2: each stability limit matches theory, and simulations beyond it diverge",
           "[stress_linear]") {
   const std::string triangle = scenes::triangle("0.1", "0.001") + scenes::output(1, "m_m2");
   check_around(triangle, "m_K", 1.31568650461023, true, 100000);
@@ -86,7 +86,7 @@ TEST_CASE("T2: each limit is where theory has it, and simulation beyond it diver
                4.0 / (top(40.0) + top(60.0)) - 0.02, true, 20000);
 }
 
-TEST_CASE("S13: a mass that grows light is kept where it is stable; the plain scheme is not",
+TEST_CASE("S13: a shrinking mass is limited for stability; the plain scheme diverges",
           "[stress_linear]") {
   const std::string text =
       "@M param 1.\n@o osc M 0.1 0.001 1. 1.\n@in1 frcInput @o\n" + scenes::output(1, "o");
@@ -114,7 +114,7 @@ TEST_CASE("S13: a mass that grows light is kept where it is stable; the plain sc
   CHECK(peak(kept.y()) < 10.0);
 }
 
-TEST_CASE("S22: a light mass on a heavy one may be as stiff as it is stable", "[stress_linear]") {
+TEST_CASE("S22: a light mass on a heavy one is stable up to its limit", "[stress_linear]") {
   const std::string text =
       "@k param 0.001\n@g ground 0.\n@a mass 1. 0. 0.\n@b mass 0.001 0. 0.\n"
       "@r spring @g @a 0.01\n@l spring @a @b k\n" +
@@ -139,8 +139,7 @@ TEST_CASE("S22: a light mass on a heavy one may be as stiff as it is stable", "[
 
 // --- S25: garbage -------------------------------------------------------------------------------
 
-TEST_CASE("S25: models that make no sense are told so, or are silent; none says what is no number",
-          "[stress_linear]") {
+TEST_CASE("S25: invalid models give an error or silence, never NaN", "[stress_linear]") {
   const auto complaints = [](const std::string& text) {
     std::string all;
     for (const Diagnostic& diagnostic : parse_network(text).diagnostics) {
@@ -193,8 +192,7 @@ TEST_CASE("S25: models that make no sense are told so, or are silent; none says 
   }
 }
 
-TEST_CASE("S25: a parameter that would make an argument no number is kept from it",
-          "[stress_linear]") {
+TEST_CASE("S25: a parameter is kept from values that make an argument NaN", "[stress_linear]") {
   // 1/p, and a mass that may vanish: the ranges stop before.
   for (const std::string& text :
        {"@p param 0.5\n@o osc 1. 0.1/p 0. 0. 0.\n@in1 frcInput @o\n" + scenes::output(1, "o"),
@@ -212,7 +210,7 @@ TEST_CASE("S25: a parameter that would make an argument no number is kept from i
   }
 }
 
-TEST_CASE("S25: events that are no numbers do nothing", "[stress_linear]") {
+TEST_CASE("S25: events with NaN are ignored", "[stress_linear]") {
   Player player(ringing_string(), struck(2));
   std::vector<Event> events = {note_on(0, 60)};
   std::uint32_t frame = 1;
@@ -237,8 +235,7 @@ TEST_CASE("S25: events that are no numbers do nothing", "[stress_linear]") {
   CHECK(error.relative() < 1e-12);  // a block that is cut is added up in another order
 }
 
-TEST_CASE("S25: samples that are no numbers are silence, and what comes after is heard",
-          "[stress_linear]") {
+TEST_CASE("S25: NaN input samples are silent, and later samples are heard", "[stress_linear]") {
   const std::string text = ringing_string();
   Preset preset = struck(1);
   preset.controls = {{.source = ControlSource::audio, .number = 1, .target = "in1"}};
@@ -273,8 +270,7 @@ TEST_CASE("S25: samples that are no numbers are silence, and what comes after is
   }
 }
 
-TEST_CASE("S25: a sound as a force may be of any loudness, and what it leaves dies away",
-          "[stress_linear]") {
+TEST_CASE("S25: a force input accepts any level, and its sound decays", "[stress_linear]") {
   const std::string pair = "@g ground 0.\n@a mass 1. 0. 0.\n@s spring @g @a 0.05 1e-3\n";
   const std::string heard = "@in1 frcInput @a\n" + scenes::output(1, "a");
   constexpr std::size_t second = 44100;

@@ -125,7 +125,7 @@ TEST_CASE("A struck mass moves as a force input would move it", "[strike]") {
 
 // With it the blow is damped in its own sample already where a kernel finds forces as it goes: a
 // share of Z/M, which is at most 0.02 here.
-TEST_CASE("A struck mass of any network moves nearly so", "[strike]") {
+TEST_CASE("A struck mass of any network moves nearly like one with a force input", "[strike]") {
   std::size_t compared = 0;
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
     const RandomNetwork random = random_network(seed);
@@ -160,7 +160,7 @@ TEST_CASE("A struck mass of any network moves nearly so", "[strike]") {
 
 // A kernel that steps by another one has told it nothing before its first step. Several steps a
 // sample feel the blow for a part of one, which the fastest mode moves by a hundredth in.
-TEST_CASE("A voice is struck in the very sample in which it begins", "[strike]") {
+TEST_CASE("A voice is struck in its first sample", "[strike]") {
   const std::string text = scenes::string("s", 5, "0.000001", "0.") + scenes::output(1, "s_m3");
   Event blow = struck_at(named_masses(text)[1].second);
   blow.frame = 0;

@@ -81,7 +81,7 @@ struct Watched : Bare<double> {
 
 }  // namespace
 
-TEST_CASE("88 keys of waveguides are in tune and ring as long as asked for", "[waveguides]") {
+TEST_CASE("88 keys of waveguides have the requested pitch and decay", "[waveguides]") {
   double worst_cents = 0.0;
   double worst_t60 = 0.0;
   int row = 0;
@@ -113,7 +113,7 @@ TEST_CASE("88 keys of waveguides are in tune and ring as long as asked for", "[w
   }
 }
 
-TEST_CASE("a waveguide's loop never gains, and keeps to its room", "[waveguides]") {
+TEST_CASE("a waveguide's loop never gains energy and stays within its memory", "[waveguides]") {
   Random random(14);
   for (int i = 0; i < 4000; ++i) {
     const double rate = std::array{44100.0, 48000.0, 96000.0, 192000.0}[random.below(4)];
@@ -216,7 +216,7 @@ TEST_CASE("a mass on a spring reflects waves as its impedance says", "[waveguide
   }
 }
 
-TEST_CASE("even and odd samples stay together", "[waveguides]") {
+TEST_CASE("even and odd samples do not decouple", "[waveguides]") {
   Bare<double> guide(program_at(
       "@s waveguide 1. 196. 5. 0.4 0.\n@h mass 4. 0. 0.\n@g ground 0.\n@z spring @g @h 0.001 0.01\n"
       "@k powerContact [@s 0.13] @h 0.5 1.5 0. 0.\n@b spring [@s 0.97] @g 0.3 0.01\n"
@@ -236,7 +236,7 @@ TEST_CASE("even and odd samples stay together", "[waveguides]") {
   CHECK(std::fabs(odd) < 1e-5 * peak);
 }
 
-TEST_CASE("voices of all lengths sound in lanes as they do alone", "[waveguides]") {
+TEST_CASE("voices of different lengths sound alike in lanes and alone", "[waveguides]") {
   const std::string text =
       "@f param 220.\n@u param 0.3\n@s waveguide 1. f 3. 0.5 0.\n@h mass 2. 0. 0.\n"
       "@k contact @h [@s u] 0.3 0.01\n@in1 frcInput @h\n@out1 posOutput [@s 0.8]\n";
@@ -259,7 +259,7 @@ TEST_CASE("voices of all lengths sound in lanes as they do alone", "[waveguides]
   }
 }
 
-TEST_CASE("a glide arrives at its pitch and makes no noise of its own", "[waveguides]") {
+TEST_CASE("a glide reaches its pitch without noise", "[waveguides]") {
   Bare<double> guide(
       program_at("@f param 220.\n@s waveguide 1. f 8. 0.2 0.\n@in1 frcInput [@s 0.41]\n"
                  "@out1 posOutput [@s 0.3]\n",
@@ -291,7 +291,7 @@ TEST_CASE("a glide arrives at its pitch and makes no noise of its own", "[wavegu
   CHECK(std::fabs(1200.0 * std::log2(found.hz / 330.0)) < 0.02);
 }
 
-TEST_CASE("whatever its numbers become, a waveguide stays within bounds", "[waveguides]") {
+TEST_CASE("a waveguide stays bounded for any parameter values", "[waveguides]") {
   const std::string text =
       "@f param 220.\n@t param 3.\n@b param 0.5\n@u param 0.3\n@R param 1.\n"
       "@s waveguide R f t b 0.\n@h mass 2. 0. 0.\n@m mass 0.5 0. 0.\n@g ground 0.\n"
@@ -321,7 +321,7 @@ TEST_CASE("whatever its numbers become, a waveguide stays within bounds", "[wave
   CHECK(most < 100.0);
 }
 
-TEST_CASE("twenty places on a short waveguide each have a sample of their own", "[waveguides]") {
+TEST_CASE("twenty places on a short waveguide occupy distinct samples", "[waveguides]") {
   std::string text = "@s waveguide 1. 980. 1e30 1. 0.\n";
   for (int i = 0; i < 20; ++i) {
     const std::string n = std::to_string(i);
@@ -342,7 +342,7 @@ TEST_CASE("twenty places on a short waveguide each have a sample of their own", 
 
 // A loop of N samples has N(N-1)/2 pairs of places, every one another shortest way between two
 // samples that may not be read together; with pitches, places and lanes at random.
-TEMPLATE_TEST_CASE("waves that are read many samples at once have the bits of one by one",
+TEMPLATE_TEST_CASE("block-wise processing of waves has the bits of sample-wise processing",
                    "[waveguides]", float, double) {
   const std::string text =
       "@f param 220.\n@t param 3.\n@b param 0.5\n@u param 0.3\n@w param 0.9\n"

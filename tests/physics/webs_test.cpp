@@ -108,7 +108,7 @@ double cubic(double d) {
 
 }  // namespace
 
-TEST_CASE("so many springs that bend are one web, and other links on them a cluster", "[webs]") {
+TEST_CASE("many nonlinear springs form a web, and other links on it a cluster", "[webs]") {
   const auto tables = [](const std::string& text) {
     return passive_tables(program_of(text, Passivity::always));
   };
@@ -127,7 +127,7 @@ TEST_CASE("so many springs that bend are one web, and other links on them a clus
   CHECK(tables(mesh("nlSpring3 .1 .01 0.", crowded)).web.count == 0);
 }
 
-TEST_CASE("a web has no more energy than was put in, however hard it is hit", "[webs]") {
+TEST_CASE("a web gains no energy at any strike", "[webs]") {
   for (const std::string law : {"nlSpring3 .1 .01 0.", "nlSpring3 .1 1000. 0.",
                                 "nlSpring2 .1 3. 0.", "nlSpring3 .1 .01 .003"}) {
     for (const std::string more :
@@ -157,7 +157,7 @@ TEST_CASE("a web keeps the energy of its springs", "[webs]") {
   CHECK(judge(mesh(springs, contact), 1., 20'000, 0.0, cubic).drift < .1);
 }
 
-TEST_CASE("a web sounds as its springs at eight times the rate, as nearly as published", "[webs]") {
+TEST_CASE("a web is as accurate as the published scheme, against eight times the rate", "[webs]") {
   // Signal to error over 10 ms. Where springs grow to seven times their stiffness at rest, what is
   // published is a tenth further off; somewhat further on it is lost, and the web goes on.
   const auto heard = [](double blow, int times, Passivity passive) {
@@ -200,7 +200,7 @@ TEST_CASE("a web sounds as its springs at eight times the rate, as nearly as pub
   CHECK(!(published > 0.0));
 }
 
-TEST_CASE("springs of a web that soften pull as published", "[webs]") {
+TEST_CASE("softening springs of a web use the published force", "[webs]") {
   double heard = 0.0;
   for (const Passivity passive : {Passivity::always, Passivity::never}) {
     Stepper<double> body(mesh("nlSpring3 .1 -.01 0."), passive);

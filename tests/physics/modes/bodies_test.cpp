@@ -72,7 +72,7 @@ TEST_CASE("a mode has its frequency and its T60 at every rate", "[bodies]") {
   }
 }
 
-TEST_CASE("a T60 that is turned is a mode's own, by exact modes and at any pitch", "[bodies]") {
+TEST_CASE("a T60 parameter sets a mode's decay with exact modes at any pitch", "[bodies]") {
   // two modes, the second of which lasts `ring` times half a second: from 0.5 s at first to 1.5 s;
   // K = M (w^2 + s^2), s = ln 1000/T60, so a factor of 9 of it is some three times the frequency
   const std::string text =
@@ -100,7 +100,7 @@ TEST_CASE("a T60 that is turned is a mode's own, by exact modes and at any pitch
   }
 }
 
-TEST_CASE("a mode's first sample is what its weights make of a push", "[bodies]") {
+TEST_CASE("a mode's first sample equals its weights times the force", "[bodies]") {
   // a push of 1 at a place of weight 0.5 moves a mode of mass 4 by 0.5/4, and a place of -2 by -2
   // times that
   const std::string text =
@@ -109,7 +109,7 @@ TEST_CASE("a mode's first sample is what its weights make of a push", "[bodies]"
   CHECK(struck(text, 44100.0, 1)[0] == Approx(-0.25).epsilon(1e-14));
 }
 
-TEST_CASE("a mode that creeps has its two real poles, however soon it ends", "[bodies]") {
+TEST_CASE("an overdamped mode has two real poles at any decay time", "[bodies]") {
   // x'' + z x' + k x = 0 has e^-(z/2 -+ sqrt(z^2/4 - k)); (1 - p)(1 - q) = K, 1 - p q = Z.
   for (const double z : {0.1, 3.0, 800.0, 1600.0, 1e4, 1e9}) {
     for (const double k : {1e-6 * z * z, 0.2 * z * z}) {
@@ -124,7 +124,7 @@ TEST_CASE("a mode that creeps has its two real poles, however soon it ends", "[b
   }
 }
 
-TEST_CASE("what is too high to ring gives way as it would at rest", "[bodies]") {
+TEST_CASE("a mode above the Nyquist frequency responds with its static compliance", "[bodies]") {
   // k = (2 pi 30000 / 44100)^2 per sample and unit of mass
   const std::string text =
       "@b body 2. p\n@b1 mode @b 30000. 1. 0.5\n@in1 frcInput [@b p]\n@out1 posOutput [@b p]\n";
@@ -136,7 +136,7 @@ TEST_CASE("what is too high to ring gives way as it would at rest", "[bodies]") 
   CHECK(std::fabs(sound[2]) < 1e-15);
 }
 
-TEST_CASE("the textbook's simulator plays bodies alike", "[bodies]") {
+TEST_CASE("the reference simulator plays bodies alike", "[bodies]") {
   const std::string text = R"(
     @tune param 1.1
     @at param 0.3
@@ -372,15 +372,16 @@ int misjudged(std::uint64_t first, int count) {
 
 }  // namespace
 
-TEST_CASE("masses and bodies are stable just as far as 4M - K - 2Z is positive", "[bodies]") {
+TEST_CASE("masses and bodies are stable exactly while 4M - K - 2Z is positive definite",
+          "[bodies]") {
   CHECK(misjudged(1, 500) == 0);
 }
 
-TEST_CASE("20,000 hybrids are judged right", "[.][bodies_everywhere]") {
+TEST_CASE("the stability of 20,000 hybrids is decided correctly", "[.][bodies_everywhere]") {
   CHECK(misjudged(1'000'001, 20'000) == 0);
 }
 
-TEST_CASE("a body is tuned where it is written", "[bodies]") {
+TEST_CASE("a body is tuned by its own lines", "[bodies]") {
   const Network network = network_of(
       "@b body 40. p\n@b1 mode @b 300. 1. 1.\n@in1 frcInput [@b p]\n@out1 posOutput [@b p]\n");
   const std::vector<double> wanted = {500.0};

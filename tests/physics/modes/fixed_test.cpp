@@ -49,7 +49,7 @@ std::vector<std::vector<double>> note(int key, const Preset& preset) {
 
 }  // namespace
 
-TEST_CASE("keys tune a string whose box stays as it is", "[fixed]") {
+TEST_CASE("keys tune a string on a fixed body", "[fixed]") {
   const Preset preset = preset_of("fixed = [\"box\"]\n");
   for (const int key : {40, 45, 52, 57, 64, 69, 76}) {
     const double hz = 440.0 * std::exp2((key - 69) / 12.0);
@@ -60,7 +60,7 @@ TEST_CASE("keys tune a string whose box stays as it is", "[fixed]") {
   }
 }
 
-TEST_CASE("a box that is fixed rings at its own modes under every key", "[fixed]") {
+TEST_CASE("a fixed body keeps its modes at every key", "[fixed]") {
   // 100 Hz is far from what these keys and their partials are
   for (const int key : {57, 64}) {
     const auto level_at = [&](const Preset& preset, double hz) {
@@ -82,7 +82,8 @@ TEST_CASE("a box that is fixed rings at its own modes under every key", "[fixed]
 }
 
 TEST_CASE("a label that the model does not have cannot be fixed", "[fixed]") {
-  const std::vector<Error> found = find_preset_errors(network_of(guitar), preset_of("fixed = [\"bix\"]\n"));
+  const std::vector<Error> found =
+      find_preset_errors(network_of(guitar), preset_of("fixed = [\"bix\"]\n"));
   REQUIRE(found.size() == 1);
   CHECK(found[0].message == "the model has nothing labelled 'bix' that keys could leave");
 }

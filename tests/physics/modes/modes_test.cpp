@@ -256,7 +256,7 @@ TEST_CASE("the modes of 208 networks are those of their sound", "[.][modes_every
   CHECK(off.modes > 1500);
 }
 
-TEST_CASE("a hand that moves and a force that is heard have their levels, too", "[modes]") {
+TEST_CASE("position inputs and force outputs have modal levels", "[modes]") {
   const std::string text =
       "@in1 posInput 0.\n@g ground 0.\n@m0 mass 1. 0. 0.\n@m1 osc 2. 0.01 0.0003 0. 0.\n"
       "@m2 mass 1.5 0. 0.\n@a springDamper @in1 @m0 0.05 0.002\n@b springDamper @m0 @m1 0.1 "
@@ -349,7 +349,7 @@ void check_mesh(std::size_t rows, std::size_t columns, std::size_t count, double
   }
 }
 
-TEST_CASE("outputs of one number are one, the sum of what each says", "[modes]") {
+TEST_CASE("outputs of equal number are summed", "[modes]") {
   const std::string text =
       "@s string 12 1. 0.2 0.001 0. 0.\n@in1 frcInput [@s 0.3]\n@out1 posOutput [@s 0.9] 0.5\n"
       "@out2 posOutput [@s 0.5]\n";
@@ -373,7 +373,7 @@ TEST_CASE("outputs of one number are one, the sum of what each says", "[modes]")
 
 }  // namespace
 
-TEST_CASE("the lowest modes of a large mesh, twins too", "[modes]") {
+TEST_CASE("the lowest modes of a large mesh include degenerate ones", "[modes]") {
   check_mesh(42, 50, 40, 0.001);
   check_mesh(45, 45, 60, 0.0);  // every second one has a twin
 }
@@ -382,7 +382,7 @@ TEST_CASE("a hundred modes of a hundred thousand masses", "[.][modes_everywhere]
   check_mesh(316, 318, 100, 0.001);
 }
 
-TEST_CASE("damping that is not proportional, many masses and few", "[modes]") {
+TEST_CASE("modes with non-proportional damping are found in small and large networks", "[modes]") {
   // The same string searched through all of it and from below.
   std::string text =
       "@s string 220 1. 0.2 0.0002 0. 0.\n@o osc 3. 0.01 0.02 0. 0.\n"
@@ -414,7 +414,7 @@ TEST_CASE("damping that is not proportional, many masses and few", "[modes]") {
   CHECK(next >= 5);
 }
 
-TEST_CASE("what does not swing is no mode", "[modes]") {
+TEST_CASE("overdamped motions are not listed as modes", "[modes]") {
   const auto count = [](const std::string& text) {
     const auto found = find_modes(network_of(text), {}, {});
     REQUIRE(found);
@@ -429,7 +429,7 @@ TEST_CASE("what does not swing is no mode", "[modes]") {
                     std::vector<double>{0.0}, {}));
 }
 
-TEST_CASE("what nothing damps rings without end, whatever is rounded", "[modes]") {
+TEST_CASE("undamped modes have an infinite T60 despite rounding", "[modes]") {
   constexpr int masses = 58;
   constexpr double stiffness = 0.1;
   std::string text = "@m0 ground 0.\n";

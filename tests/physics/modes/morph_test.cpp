@@ -156,7 +156,7 @@ TEST_CASE("a morph of 5 s keeps the pitch to a tenth of a cent, without a step",
   }
 }
 
-TEST_CASE("what a tenth of a cent and a step of -60 dB leave would be noticed", "[morph]") {
+TEST_CASE("the morph test detects a tenth of a cent and a step of -60 dB", "[morph]") {
   std::vector<double> y(static_cast<std::size_t>(rate_hz));
   for (std::size_t n = 0; n < y.size(); ++n) {
     y[n] = std::sin(2.0 * std::numbers::pi * 220.0 * std::exp2(0.1 / 1200.0) *
@@ -202,7 +202,7 @@ TEST_CASE("each stop of a morph sounds as its preset does", "[morph]") {
   }
 }
 
-TEST_CASE("between two stops stiffness and damping go by equal ratios, places in straight lines",
+TEST_CASE("between stops, stiffness and damping change by equal ratios and places linearly",
           "[morph]") {
   const Network network = network_of(string_text);
   auto through = morphed(network, stops_of(network, 3), "t", std::vector<std::string>{"A"});
@@ -233,8 +233,7 @@ TEST_CASE("between two stops stiffness and damping go by equal ratios, places in
   }
 }
 
-TEST_CASE("levels go in straight lines of dB, and nothing to something in straight lines",
-          "[morph]") {
+TEST_CASE("levels change linearly in dB, and linearly from 0", "[morph]") {
   const Network network = network_of(
       "@L param 1.\n@Z param 0.\n@m osc 1. 0.01 Z 0. 0.\n@in1 frcInput @m\n@out1 posOutput @m L\n");
   const std::vector<MorphStop> stops = {
@@ -248,7 +247,7 @@ TEST_CASE("levels go in straight lines of dB, and nothing to something in straig
   CHECK(argument_value(*through, through->masses[0].damping, middle) == Approx(0.002));
 }
 
-TEST_CASE("T60 goes by equal ratios between stops, whatever damps where", "[morph]") {
+TEST_CASE("T60 changes by equal ratios between stops with any damping", "[morph]") {
   const Scene scene = string_scene(2);
   const int t = index_of(scene.network, "t");
   const auto t60 = [&](double position) {
@@ -273,7 +272,7 @@ TEST_CASE("T60 goes by equal ratios between stops, whatever damps where", "[morp
   CHECK(std::fabs(loose / std::sqrt(first * last) - 1.0) > 0.05);
 }
 
-TEST_CASE("what cannot be morphed is refused with what to do", "[morph]") {
+TEST_CASE("a morph that is not possible is rejected with advice", "[morph]") {
   const auto refused = [](const std::string& a, const std::string& b) {
     const Network one = network_of(a);
     const Network other = network_of(b);

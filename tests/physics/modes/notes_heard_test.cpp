@@ -54,7 +54,7 @@ std::vector<double> struck(const Network& network, double seconds) {
 
 }  // namespace
 
-TEST_CASE("a structure brought to a note and a decay is heard with both", "[notes_heard]") {
+TEST_CASE("a structure tuned to a note and a decay sounds with both", "[notes_heard]") {
   const auto seeds = of_all<std::uint64_t>(6, 24);
   for (std::uint64_t seed = 0; seed < seeds; ++seed) {
     Random random(seed + 1);

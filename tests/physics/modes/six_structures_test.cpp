@@ -95,8 +95,7 @@ int index_of(const std::string& name) {
 
 }  // namespace
 
-TEST_CASE("six structures sound at one pitch and decay as long, at three keys",
-          "[six_structures]") {
+TEST_CASE("six structures share pitch and decay at three keys", "[six_structures]") {
   for (const double rate_hz : {44100.0, 48000.0}) {
     for (int i = 0; i < static_cast<int>(structures); ++i) {
       for (const int key : {45, 57, 69}) {
@@ -114,8 +113,7 @@ TEST_CASE("six structures sound at one pitch and decay as long, at three keys",
   }
 }
 
-TEST_CASE("T60 is what is asked for, and moves the pitch by less than a twentieth of a cent",
-          "[six_structures]") {
+TEST_CASE("T60 is reached and moves the pitch by less than 0.05 cents", "[six_structures]") {
   const int t60 = index_of("t60");
   Network network = network_of(text_of("/models/SixStructures.mdl"));
   network.outputs.resize(structures);
@@ -148,7 +146,7 @@ TEST_CASE("T60 is what is asked for, and moves the pitch by less than a twentiet
 }
 
 // Turned while it sounds, and low, where dampers flatten the most: 3 cents at 55 Hz without.
-TEST_CASE("keys stay in tune while T60 is turned", "[six_structures]") {
+TEST_CASE("keys stay in tune while T60 changes", "[six_structures]") {
   const int t60 = index_of("t60");
   const auto found_at = [&](bool is_tuned) {
     Preset quick = preset();
@@ -167,7 +165,7 @@ TEST_CASE("keys stay in tune while T60 is turned", "[six_structures]") {
   CHECK(std::fabs(found_at(false)) > 0.5);
 }
 
-TEST_CASE("a T60 that a structure cannot have is refused with the reason", "[six_structures]") {
+TEST_CASE("an unreachable T60 is rejected with the reason", "[six_structures]") {
   Preset wide = preset();
   for (ParameterSetting& setting : wide.parameters) {
     if (setting.name == "t60") {
@@ -181,8 +179,7 @@ TEST_CASE("a T60 that a structure cannot have is refused with the reason", "[six
   CHECK(compiled->stability.narrowed[0].message.find("t60") != std::string::npos);
 }
 
-TEST_CASE("a structure a hundredth of a cent and a thousandth of its decay off would be noticed",
-          "[six_structures]") {
+TEST_CASE("the test detects 0.01 cents and 0.1 % of a decay", "[six_structures]") {
   std::vector<double> y(96000);
   for (std::size_t n = 0; n < y.size(); ++n) {
     const double t = static_cast<double>(n) / 48000.0;
@@ -195,8 +192,7 @@ TEST_CASE("a structure a hundredth of a cent and a thousandth of its decay off w
 }
 
 // The patch's gains, 128 being 0 dB and a step 0.6 dB.
-TEST_CASE("the mixes 1 to 6 are those that the patch stores, with straight lines of dB between",
-          "[six_structures]") {
+TEST_CASE("mixes 1 to 6 equal the stored ones, linear in dB in between", "[six_structures]") {
   constexpr double table[6][structures] = {
       {107, 100, 36, 113, 36, 36}, {42, 69, 106, 106, 128, 106}, {30, 74, 129, 95, 95, 113},
       {98, 49, 44, 114, 98, 15},   {115, 117, 78, 84, 73, 50},   {25, 67, 78, 65, 124, 56}};
@@ -218,7 +214,7 @@ TEST_CASE("the mixes 1 to 6 are those that the patch stores, with straight lines
 
 // All six as one: nowhere do they fade away, as straight lines of dB from an extreme to the next
 // do.
-TEST_CASE("a key is heard at every mix", "[six_structures]") {
+TEST_CASE("a key is audible at every mix", "[six_structures]") {
   const int timbre = index_of("timbre");
   const auto at = [&](double position) {
     return peak_of(played({}, 0.2, {parameter(0, timbre, position), note_on(0, 60)}));
@@ -232,8 +228,7 @@ TEST_CASE("a key is heard at every mix", "[six_structures]") {
 
 // Each figure of the frame at 0.33 s of A3, as `describe --at 14400` has it: no other mix of the
 // six structures, from 0 to -60 dB of the loudest, goes beyond the extreme.
-TEST_CASE("the mixes 7 to 12 are those at which six figures have their extrema",
-          "[six_structures]") {
+TEST_CASE("mixes 7 to 12 have the extrema of six descriptors", "[six_structures]") {
   constexpr double rate_hz = 44100.0;
   constexpr std::size_t size = 2048;
   const Network network = network_of(text_of("/models/SixStructures.mdl"));
@@ -320,7 +315,7 @@ TEST_CASE("the mixes 7 to 12 are those at which six figures have their extrema",
   }
 }
 
-TEST_CASE("a sweep through the mixes moves neither pitch nor jumps", "[six_structures]") {
+TEST_CASE("a sweep through the mixes keeps the pitch and has no steps", "[six_structures]") {
   constexpr double rate_hz = 48000.0;
   std::vector<Event> events = {controller(0, 1, 0.0), note_on(0, 45)};
   for (int step = 1; step <= 127; ++step) {  // as a controller does it, in 5 s
@@ -351,7 +346,7 @@ TEST_CASE("a sweep through the mixes moves neither pitch nor jumps", "[six_struc
   }
 }
 
-TEST_CASE("outputs of one number add up, each times its level", "[six_structures]") {
+TEST_CASE("outputs of equal number add up, each times its level", "[six_structures]") {
   const std::string strings =
       "@p param 0.5\n@s string 12 1. 0.1 0.001 0. 0.\n@t string 12 1. 0.2 0.001 0. 0.\n"
       "@in1 frcInput [@s 0.3]\n@in2 frcInput [@t 0.3]\n";
@@ -373,7 +368,7 @@ TEST_CASE("outputs of one number add up, each times its level", "[six_structures
   CHECK(peak_of(both[0]) > 1e-4);
 }
 
-TEST_CASE("a level that cannot be is told with its place", "[six_structures]") {
+TEST_CASE("an invalid level is reported with its position", "[six_structures]") {
   const auto told = [](const std::string& line) {
     const ParsedNetwork parsed =
         parse_network("@l audioParam @in1\n@s string 12 1. 0.1 0. 0. 0.\n" + line + "\n");

@@ -82,7 +82,7 @@ std::vector<double> played(const PlacedModes& modes, std::size_t from, std::size
 
 }  // namespace
 
-TEST_CASE("a mode is brought to a note and a decay, all of a model or a part", "[tune_modes]") {
+TEST_CASE("a mode of a model or a part is tuned to a note and a decay", "[tune_modes]") {
   const Network network = network_of(two_strings);
   const double start_hz = modes_of(network).modes[0].frequency_hz;
   for (const double factor : {0.5, 0.97, 1.9}) {
@@ -116,7 +116,7 @@ TEST_CASE("a mode is brought to a note and a decay, all of a model or a part", "
   CHECK(start_hz > 0.0);
 }
 
-TEST_CASE("what cannot be tuned says why", "[tune_modes]") {
+TEST_CASE("impossible tunings report the reason", "[tune_modes]") {
   const Network network = network_of(two_strings);
   const auto message = [&](const TuneTarget& target) {
     const auto tuned = tune_mode(network, parameter_values(network), target, {});
@@ -153,7 +153,7 @@ TEST_CASE("springs are found for a list of frequencies", "[tune_modes]") {
   }
 }
 
-TEST_CASE("a harmonic series from a string that is one line", "[tune_modes]") {
+TEST_CASE("a one-line string is tuned to a harmonic series", "[tune_modes]") {
   const Network network = network_of(
       "@s string 12 1. 0.05 0.0001 0. 0.\n@in1 frcInput [@s 0.3]\n@out1 posOutput [@s 0.6]\n");
   const std::vector<double> wanted = {220.0, 440.0, 660.0};
@@ -166,7 +166,7 @@ TEST_CASE("a harmonic series from a string that is one line", "[tune_modes]") {
   }
 }
 
-TEST_CASE("one law of decay on any structure", "[tune_modes]") {
+TEST_CASE("a decay law applies to any structure", "[tune_modes]") {
   const auto law = decay_law({{100.0, 6.0}, {3000.0, 0.8}});
   REQUIRE(law);
   CHECK(std::fabs(law->t60_s(100.0) - 6.0) < 1e-12);
@@ -230,7 +230,7 @@ TEST_CASE("a body's text names its places and modes", "[tune_modes]") {
         "@bell2 mode @bell 601.2 1000000000 0.8 0.35\n");
 }
 
-TEST_CASE("a chain answers at its first mass as a place of a body does", "[tune_modes]") {
+TEST_CASE("a chain's first mass responds like a place of a body", "[tune_modes]") {
   Random random(5);
   for (const std::size_t count : {1u, 2u, 8u, 40u}) {
     PlacedModes body{.mass = random.uniform(0.5, 40.0), .places = {"rim"}};
@@ -268,7 +268,7 @@ TEST_CASE("a chain answers at its first mass as a place of a body does", "[tune_
   }
 }
 
-TEST_CASE("what no chain can be says why", "[tune_modes]") {
+TEST_CASE("impossible chains report the reason", "[tune_modes]") {
   const PlacedModes body{.places = {"rim", "crown"},
                          .modes = {{100.0, 1.0, {1.0, 0.0}}, {100.0, 1.0, {1.0, 0.0}}}};
   CHECK(chain_of(body, "rom").error().message == "there is no place 'rom'; there are rim, crown");

@@ -124,7 +124,7 @@ Result<AskedTimbre> asked(const Played& model, std::span<const double> start,
 
 }  // namespace
 
-TEST_CASE("figures by samples are those of the sound", "[ask]") {
+TEST_CASE("figures computed from samples equal those of the sound", "[ask]") {
   support::Random random(5);
   for (const Played& model : models) {
     INFO(model.text);
@@ -147,7 +147,7 @@ TEST_CASE("figures by samples are those of the sound", "[ask]") {
   }
 }
 
-TEST_CASE("hidden parameters' timbre is found again, every time", "[ask]") {
+TEST_CASE("the timbre of hidden parameters is always found", "[ask]") {
   const int seeds = support::of_all(5, 20);
   int found = 0;
   double worst = 0.0;
@@ -196,7 +196,7 @@ const Played beating{
     "@l2 spring @a @b c\n@in1 frcInput @a\n@out1 posOutput @b\n",
     {{0.001, 0.004}, {0.000005, 0.0002}, {0.0001, 0.002}}};
 
-TEST_CASE("an attack that is asked for is that of the sound", "[ask]") {
+TEST_CASE("a requested attack is reached in the sound", "[ask]") {
   const auto index = static_cast<std::size_t>(AskedFigure::attack);
   support::Random random(15);
   for (int round = 0; round < 5; ++round) {
@@ -226,7 +226,7 @@ TEST_CASE("an attack that is asked for is that of the sound", "[ask]") {
   CHECK(slowest->values[2] == Approx(0.0001));
 }
 
-TEST_CASE("what cannot be had is named, with the bound that holds it", "[ask]") {
+TEST_CASE("unreachable targets are reported with the bound that limits them", "[ask]") {
   const Played& model = models[0];
   const std::vector<double> start{0.2, 0.001, 0.3};
   // f = rate / pi asin(sqrt(K/M) sin(pi / 2 / (N + 1))), by hand: 40 masses, of which 38 move.
@@ -255,7 +255,7 @@ TEST_CASE("what cannot be had is named, with the bound that holds it", "[ask]") 
         Approx(-3.0 * std::log(10.0) / (rate_hz * 0.5 * std::log1p(-zeta))).epsilon(1e-6));
 }
 
-TEST_CASE("figures that are none, and models that nothing turns, are refused", "[ask]") {
+TEST_CASE("invalid figures and models without free parameters are rejected", "[ask]") {
   const Played& model = models[0];
   const std::vector<double> start{0.2, 0.001, 0.3};
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -298,7 +298,7 @@ TEST_CASE("figures that are none, and models that nothing turns, are refused", "
   CHECK(ask_timbre({any}, start, one, hollow, {}).error().message == "it has no odd_to_even there");
 }
 
-TEST_CASE("silence, corners that are not stable, and who stops it", "[ask]") {
+TEST_CASE("a search handles silence, unstable corners and cancellation", "[ask]") {
   // Heard at a mass that no spring reaches.
   const Played silent{
       "@k param 0.1\n@g ground 0.\n@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n"
@@ -333,7 +333,7 @@ TEST_CASE("silence, corners that are not stable, and who stops it", "[ask]") {
   CHECK(stopped_one.error().message == stopped);
 }
 
-TEST_CASE("a key's pitch stays where it is while the timbre moves", "[ask]") {
+TEST_CASE("a key's pitch stays constant while the timbre changes", "[ask]") {
   const Network network = read(models[1]);
   const FreeParameter free[] = {{0, 0.05, 0.5}, {1, 1e-3, 0.1}, {2, 1e-4, 0.01}};
   StruckModel keyed(network, {.key_hz = 220.0});
@@ -346,7 +346,7 @@ TEST_CASE("a key's pitch stays where it is while the timbre moves", "[ask]") {
   CHECK(std::fabs(cents) < 1e-5);
 }
 
-TEST_CASE("a key moves what springs hold by places of a string", "[ask]") {
+TEST_CASE("a key scales springs at places of a string", "[ask]") {
   const Network network = support::network_of(
       "@z param 0.001\n@s chain 12 1. 0.2 z 0. 0.\n@g ground 0.\n@foot spring @g [@s 0.3] 0.05\n"
       "@in1 frcInput [@s 0.3]\n@out1 posOutput [@s 0.9]\n");
@@ -357,7 +357,7 @@ TEST_CASE("a key moves what springs hold by places of a string", "[ask]") {
 }
 
 // A raised cosine of 2 ms is a filter; and what is heard of two ears is their mean.
-TEST_CASE("a longer blow is darker, as the sound of the same pulse has it", "[ask]") {
+TEST_CASE("a longer strike is darker, like the sound of the same pulse", "[ask]") {
   const Network network = support::network_of(
       "@k param 0.2\n@s string 40 1. k 0.001 0. 0.\n@in1 frcInput [@s 0.23]\n"
       "@out1 posOutput [@s 0.71]\n@out2 posOutput [@s 0.4]\n");

@@ -36,7 +36,7 @@ double stiffest(const Network& network) {
   return rho;
 }
 
-TEST_CASE("the edge bound by hand", "[bound]") {
+TEST_CASE("the edge bound equals hand-computed values", "[bound]") {
   // Triangle: d0 = .05 + .2 and 2 (.01 + .002), d1 = .2 and 2 (.002); together .45 + .028 = .478.
   CHECK(factor_of(scenes::poly_triangle()) == Approx((bound_limit - .028) / .45).epsilon(1e-14));
   // String: two inner neighbours, 4 K and 8 Z.
@@ -69,7 +69,7 @@ TEST_CASE("every law counts with its steepest slope", "[bound]") {
   }
 }
 
-TEST_CASE("where nothing bounds, and where dampers alone are too strong", "[bound]") {
+TEST_CASE("the edge bound handles unlimited networks and excessive dampers", "[bound]") {
   CHECK(factor_of("@m mass 1. 0. 0.") == 1e9);
   CHECK(factor_of("@g ground 0.") == 1e9);
   CHECK(factor_of(mass_and_ground + "@d damper @m @g 3.9") == 1e9);

@@ -67,7 +67,7 @@ TEST_CASE("a string's lowest mode is 4 sin^2(pi / 2(N+1)) of K and of Z", "[line
   check_mode("resonator", mode_of(scenes::resonator()), 0.3 * share, 0.01 * share, 1e-9);
 }
 
-TEST_CASE("one oscillator is its own mode", "[linear]") {
+TEST_CASE("a single oscillator is its own mode", "[linear]") {
   const auto mode = mode_of("@o osc 1. 0.1 0.001 0. 0.");
   check_mode("oscillator", mode, 0.1, 0.001, 1e-12);
   CHECK(mode->frequency_hz == Approx(2229.431351291107).epsilon(1e-12));
@@ -78,7 +78,7 @@ TEST_CASE("one oscillator is its own mode", "[linear]") {
              0.2, 0.01, 1e-12);
 }
 
-TEST_CASE("the triangle's lowest mode is that of its 2x2 by hand", "[linear]") {
+TEST_CASE("the triangle's lowest mode equals that of its 2x2 matrix", "[linear]") {
   // Symmetric in m1 and m2: with s = (m1 + m2)/sqrt 2 the stiffness is [[.25, -.1 sqrt 2],
   // [-.1 sqrt 2, .1]] over (m0, s). Its lower eigenvalue is (.35 - sqrt(.1025))/2.
   const double kappa = (0.35 - std::sqrt(0.1025)) / 2.0;
@@ -93,7 +93,7 @@ TEST_CASE("the triangle's lowest mode is that of its 2x2 by hand", "[linear]") {
   CHECK(std::fabs(mode->frequency_hz / 858.455895090791 - 1.0) < 1e-4);
 }
 
-TEST_CASE("rigid motion is no mode", "[linear]") {
+TEST_CASE("rigid motions are not modes", "[linear]") {
   for (const int count : {2, 3, 60, 200}) {
     // A free chain's are 4 sin^2(j pi / 2N), j = 0 being rigid.
     const double share = 4.0 * sin_squared(std::numbers::pi / (2.0 * count)) / 2.0;
@@ -105,7 +105,7 @@ TEST_CASE("rigid motion is no mode", "[linear]") {
   CHECK_FALSE(mode_of("@m mass 1. 0. 0.\n@g ground 0.\n@d damper @m @g 0.1"));
 }
 
-TEST_CASE("plucks, bows and contacts are open, the slowest of several parts counts", "[linear]") {
+TEST_CASE("links that are not springs are open, and the slowest part counts", "[linear]") {
   CHECK_FALSE(
       mode_of("@m mass 1. 0. 0.\n@g ground 0.\n@d nlPluck @m @g 0.1 1\n@c contact @m @g 1 1"
               "\n@b nlBow @m @g 1 1"));
@@ -119,7 +119,7 @@ TEST_CASE("plucks, bows and contacts are open, the slowest of several parts coun
       0.001 * 4.0 * sin_squared(std::numbers::pi / 12.0), 1e-12);
 }
 
-TEST_CASE("the parameters as they are set count, not as they are written", "[linear]") {
+TEST_CASE("the current parameters count, not the written ones", "[linear]") {
   const Network network = network_of(scenes::string("s", 10, "0.1", "0.001"));
   const double values[] = {2.0, 0.4, 0.002};  // M, K, Z
   const double share = 4.0 * sin_squared(std::numbers::pi / 22.0) / 2.0;

@@ -48,7 +48,7 @@ NearbyModes nearby(const Network& network) {
 
 }  // namespace
 
-TEST_CASE("shapes that are kept give the modes exactly", "[nearby_modes]") {
+TEST_CASE("unchanged shapes give the modes exactly", "[nearby_modes]") {
   // K, Z, M and a place of a rectangle and of a square, whose modes come in pairs.
   for (const char* const size : {"7 9", "8 8"}) {
     const Network network = expand_macros(support::network_of(
@@ -77,7 +77,7 @@ TEST_CASE("shapes that are kept give the modes exactly", "[nearby_modes]") {
   }
 }
 
-TEST_CASE("other rows, and other shapes, are not taken for the same", "[nearby_modes]") {
+TEST_CASE("different rows or shapes are detected", "[nearby_modes]") {
   const auto text = [](const char* masses) {
     return "@k param 0.1\n@c param 0.02\n@s string " + std::string(masses) +
            " 1. k 0.001 0. 0.\n@g ground 0.\n@foot spring @g [@s 0.4] c\n"
@@ -97,7 +97,7 @@ TEST_CASE("other rows, and other shapes, are not taken for the same", "[nearby_m
 
 // What a motion's pole and residue move by with the first parameter: by first order, and by modes
 // found anew a little to either side, where the third order is left.
-TEST_CASE("shapes that change a little change as central differences say", "[nearby_modes]") {
+TEST_CASE("small changes of shape match central differences", "[nearby_modes]") {
   const std::string ends =
       "@in1 frcInput [@s 0.1818181818]\n@out1 posOutput [@s 0.6363636364]\n@out2 posOutput [@s "
       "0.8181818182]\n";
@@ -160,7 +160,7 @@ TEST_CASE("shapes that change a little change as central differences say", "[nea
   }
 }
 
-TEST_CASE("modes of one frequency that a change tells apart are found anew", "[nearby_modes]") {
+TEST_CASE("degenerate modes that split are computed anew", "[nearby_modes]") {
   // A square, and a spring that is no part of its symmetry.
   const Network network = expand_macros(
       support::network_of("@c param 0.\n@s closedMesh 8 8 1. 0.1 0.001 0. 0.\n@g ground 0.\n"

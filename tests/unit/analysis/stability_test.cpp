@@ -156,7 +156,7 @@ TEST_CASE("a parameter that starts at 0 may go to both sides", "[stability]") {
   CHECK(range_of("@w param 0.\n@o osc 1. 0.5 w 0. 0.\n", "w").lowest == 0.0);
 }
 
-TEST_CASE("every unstable root is a negative eigenvalue of 4M - K - 2Z, and the proof says so",
+TEST_CASE("every unstable root is a negative eigenvalue of 4M - K - 2Z, and the proof finds it",
           "[stability]") {
   support::Random random(11);
   int unstable = 0;
@@ -210,7 +210,7 @@ TEST_CASE("the exact factor on every stiffness is where the lowest eigenvalue is
   CHECK(found > 150);
 }
 
-TEST_CASE("how far one parameter may go, as theory has it", "[stability]") {
+TEST_CASE("the range of one parameter matches theory", "[stability]") {
   // The triangle, by the dense eigenvalues of its three masses.
   CHECK(highest(scenes::poly_triangle(), "m_K") == exactly(1.31568650461023));
   CHECK(highest(scenes::poly_triangle(), "m_Z") == exactly(0.608843252305113));
@@ -282,7 +282,7 @@ TEST_CASE("every law counts in the proof with its steepest slope", "[stability]"
   CHECK(Stability(half, 0.5).safe_range(as_written(half), 0, 1.0)->highest == exactly(15.6));
 }
 
-TEST_CASE("a parameter's limit through what is made of it", "[stability]") {
+TEST_CASE("a parameter's limit is found through formulas", "[stability]") {
   const auto osc = [](const std::string& mass, const std::string& stiffness) {
     return "@p param 0.3\n@o osc " + mass + " " + stiffness + " 0. 0. 0.\n";
   };
@@ -309,7 +309,7 @@ TEST_CASE("a parameter's limit through what is made of it", "[stability]") {
   CHECK((std::isinf(unused.lowest) && std::isinf(unused.highest)));
 }
 
-TEST_CASE("a proof holds wherever the others are turned to", "[stability]") {
+TEST_CASE("a proof holds for all values of the other parameters", "[stability]") {
   const Network network = network_of(scenes::string("s", 50, "0.1", "0.001"));
   const ParameterBox box{{0.5, 0.01, 0.0}, {4.0, 0.2, 0.01}};  // M, K, Z
   Stability stability(network, 1.0);
@@ -397,7 +397,7 @@ TEST_CASE("links at places that move count at the worst of them", "[stability]")
   CHECK(verdict("2.6") == Verdict::unstable);
 }
 
-TEST_CASE("who is to blame, by name and line, and what would pass", "[stability]") {
+TEST_CASE("the culprit is named with its line and its limit", "[stability]") {
   const std::string pair = "@m0 mass 1. 0. 0.\n@m1 mass 1. 0. 0.\n@g ground 0.\n";
   CHECK(complaint_of(pair + "@r spring @m0 @m1 1.9") == "");
   CHECK(complaint_of(pair + "@r spring @m0 @m1 2.5") ==
@@ -431,7 +431,7 @@ TEST_CASE("who is to blame, by name and line, and what would pass", "[stability]
         std::string::npos);
 }
 
-TEST_CASE("negative springs are stable where others make up for them", "[stability]") {
+TEST_CASE("negative springs are stable if others compensate them", "[stability]") {
   const std::string pair = "@m0 mass 1. 0. 0.\n@m1 mass 1. 0. 0.\n";
   CHECK(complaint_of(pair + "@a spring @m0 @m1 0.3\n@b spring @m0 @m1 -0.2\n") == "");
   CHECK(complaint_of(pair + "@a spring @m0 @m1 0.2\n@b spring @m0 @m1 -0.3\n") ==
@@ -440,7 +440,7 @@ TEST_CASE("negative springs are stable where others make up for them", "[stabili
         "3: may be unstable: the damping -0.1 of 'a' is negative, and motion may grow by itself");
 }
 
-TEST_CASE("what holds a waveguide is stable unless it is negative", "[stability]") {
+TEST_CASE("a link on a waveguide is stable unless it is negative", "[stability]") {
   const std::string held =
       "@K param 0.1\n@w waveguide 1. 220. 3. 0.4 0.\n@m mass 1. 0. 0.\n@g ground 0.\n";
   CHECK(complaint_of(held + "@a spring @m [@w 0.3] 1e6 1e6\n@b contact @g [@w 0.6] 1e6 1.\n") ==
@@ -458,7 +458,7 @@ TEST_CASE("what holds a waveguide is stable unless it is negative", "[stability]
   CHECK(std::isinf(range.highest));
 }
 
-TEST_CASE("what is too large to factor is proved by the bound, or not at all", "[stability]") {
+TEST_CASE("networks too large to factor are proved by the bound or not at all", "[stability]") {
   const auto verdict = [](const std::string& stiffness) {
     const Network network = network_of("@d mesh 201 200 1. " + stiffness + " 0. 0. 0.\n");
     return Stability(network, 1.0).certify(as_written(network)).verdict;
@@ -470,7 +470,7 @@ TEST_CASE("what is too large to factor is proved by the bound, or not at all", "
   CHECK(bound.highest > 0.499);
 }
 
-TEST_CASE("limits are printed on the safe side", "[stability]") {
+TEST_CASE("limits are rounded to the safe side", "[stability]") {
   CHECK(print_limit(1.31568650461023, true) == "1.31568");
   CHECK(print_limit(0.0889851164104615, false) == "0.0889852");
   CHECK(print_limit(4.0 - 1e-13, true) == "4");

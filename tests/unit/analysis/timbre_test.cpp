@@ -39,7 +39,7 @@ std::vector<Partial> harmonics(int count, int step = 1) {
 
 }  // namespace
 
-TEST_CASE("Four lines are described as by hand", "[timbre]") {
+TEST_CASE("Four spectral lines have hand-computed descriptors", "[timbre]") {
   // p = 0.1 to 0.4: mean 300, variance (40000 + 2 * 10000 + 0 + 4 * 10000) / 10 = 10000.
   const std::vector<double> f{100.0, 200.0, 300.0, 400.0};
   const auto shape = spectral_shape(f, std::vector{1.0, 2.0, 3.0, 4.0}, magnitude);
@@ -61,7 +61,7 @@ TEST_CASE("Four lines are described as by hand", "[timbre]") {
   CHECK(squared->centroid_hz == near(1000.0 / 3.0));  // (1 + 8 + 27 + 64) / 30 * 100
 }
 
-TEST_CASE("Ten harmonics are described as elsewhere", "[timbre]") {
+TEST_CASE("Ten harmonics have the descriptors of other programs", "[timbre]") {
   const auto shape = spectral_shape(harmonics(10), magnitude);
   REQUIRE(shape);
   CHECK(shape->centroid_hz == near(751.117735));
@@ -83,7 +83,7 @@ TEST_CASE("Ten harmonics are described as elsewhere", "[timbre]") {
   CHECK(*harmonic->odd_to_even == near(3.23546315));
 }
 
-TEST_CASE("Odd harmonics are described as elsewhere", "[timbre]") {
+TEST_CASE("Odd harmonics have the descriptors of other programs", "[timbre]") {
   const auto shape = spectral_shape(harmonics(9, 2), magnitude);
   REQUIRE(shape);
   CHECK(shape->centroid_hz == near(615.452931));
@@ -100,7 +100,7 @@ TEST_CASE("Odd harmonics are described as elsewhere", "[timbre]") {
   CHECK_FALSE(harmonic_shape(all, 220.0)->odd_to_even);
 }
 
-TEST_CASE("A stiff string's partials are as inharmonic as elsewhere", "[timbre]") {
+TEST_CASE("A stiff string has the inharmonicity of other programs", "[timbre]") {
   constexpr double b = 1e-3;
   std::vector<Partial> partials;
   for (int k = 1; k <= 10; ++k) {
@@ -110,7 +110,7 @@ TEST_CASE("A stiff string's partials are as inharmonic as elsewhere", "[timbre]"
   CHECK(harmonic_shape(harmonics_of(partials, 220.0), 220.0)->inharmonicity == near(0.0331121446));
 }
 
-TEST_CASE("Harmonic deviation and noisiness are as by hand", "[timbre]") {
+TEST_CASE("Harmonic deviation and noisiness equal hand-computed values", "[timbre]") {
   // Neighbours' means 4, 3, 2, 1.5: |4 - 4| + |1 - 3| + |4 - 2| + |1 - 2.5|, a fourth of it.
   const std::vector<Partial> partials{{100, 4.0}, {200, 1.0}, {300, 4.0}, {400, 1.0}};
   const auto shape = harmonic_shape(partials, 100.0);
@@ -120,7 +120,7 @@ TEST_CASE("Harmonic deviation and noisiness are as by hand", "[timbre]") {
   CHECK_FALSE(noisiness(partials, 0.0));
 }
 
-TEST_CASE("An attack and a decay are described as elsewhere", "[timbre]") {
+TEST_CASE("An attack and a decay have the descriptors of other programs", "[timbre]") {
   constexpr double rate = 48000.0;
   std::vector<double> envelope;
   std::vector<double> squared;
@@ -137,7 +137,7 @@ TEST_CASE("An attack and a decay are described as elsewhere", "[timbre]") {
   CHECK(*shape->decay_slope == near(-std::log(1000.0)));
 }
 
-TEST_CASE("An attack leaves out what takes more than three times the mean effort", "[timbre]") {
+TEST_CASE("An attack excludes steps above three times the mean effort", "[timbre]") {
   // A tenth every 100 samples, but 1000 from 10 to 20 %, and 1000 from 80 to 90 %.
   std::vector<double> envelope{0.0};
   for (int tenth = 1; tenth <= 10; ++tenth) {
@@ -151,7 +151,7 @@ TEST_CASE("An attack leaves out what takes more than three times the mean effort
   CHECK(temporal_shape(envelope, 1000.0)->log_attack_time == near(std::log10(0.6)));
 }
 
-TEST_CASE("Where there is nothing, nothing is described", "[timbre]") {
+TEST_CASE("Empty and silent input has no descriptors", "[timbre]") {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   const std::vector<double> f{100.0, 200.0};
   CHECK_FALSE(spectral_shape(f, std::vector{0.0, 0.0}, magnitude));
@@ -192,7 +192,7 @@ TEST_CASE("Where there is nothing, nothing is described", "[timbre]") {
   CHECK_FALSE(click->decay_slope);
 }
 
-TEST_CASE("A shape does not depend on how loud or how high it is", "[timbre]") {
+TEST_CASE("A shape does not depend on level or pitch", "[timbre]") {
   Random random(7);
   for (int round = 0; round < 100; ++round) {
     std::vector<double> f;
@@ -223,7 +223,7 @@ TEST_CASE("A shape does not depend on how loud or how high it is", "[timbre]") {
   CHECK(*spectral_flux(std::vector{1.0, 0.0}, std::vector{1.0, 1.0}) == near(1.0 - std::sqrt(0.5)));
 }
 
-TEST_CASE("A window's response is the sum over its weights", "[timbre]") {
+TEST_CASE("A window's response equals the sum over its weights", "[timbre]") {
   Random random(3);
   for (const Window window : {Window::hann, Window::hamming, Window::blackman, Window::none}) {
     for (int round = 0; round < 50; ++round) {
@@ -247,7 +247,7 @@ TEST_CASE("A window's response is the sum over its weights", "[timbre]") {
   }
 }
 
-TEST_CASE("Modes in a frame are described without a sound", "[timbre]") {
+TEST_CASE("Descriptors of modes in a frame match the synthesised sound", "[timbre]") {
   constexpr double rate = 48000.0;
   const double bell[][3] = {{220.0, 2.0, 1.0},
                             {441.5, 1.2, 0.6},
@@ -309,7 +309,7 @@ FrameTimbre frame_of(std::span<const double> samples, SpectrumKind kind,
 
 }  // namespace
 
-TEST_CASE("A frame of harmonics is described as elsewhere", "[timbre]") {
+TEST_CASE("A frame of harmonics has the descriptors of other programs", "[timbre]") {
   std::vector<double> sound(4096);
   for (std::size_t n = 0; n < sound.size(); ++n) {
     for (int h = 1; h <= 10; ++h) {
@@ -332,7 +332,7 @@ TEST_CASE("A frame of harmonics is described as elsewhere", "[timbre]") {
   CHECK(squared->rolloff95_hz == 2812.5);
 }
 
-TEST_CASE("A bell's frames are described as elsewhere, and as its modes are", "[timbre]") {
+TEST_CASE("A bell's frames match other programs and its own modes", "[timbre]") {
   const auto sound = bell(26048);
   const struct {
     std::size_t at;
@@ -366,7 +366,7 @@ TEST_CASE("A bell's frames are described as elsewhere, and as its modes are", "[
   }
 }
 
-TEST_CASE("Partials are found between bins, and while they decay", "[timbre]") {
+TEST_CASE("Decaying partials are found between bins", "[timbre]") {
   // Of a lone one the window's derivative gives the frequency itself.
   for (const double f : {440.0, 445.3, 451.0, 12345.6}) {
     std::vector<double> sound(2048);
@@ -390,7 +390,7 @@ TEST_CASE("Partials are found between bins, and while they decay", "[timbre]") {
   }
 }
 
-TEST_CASE("A sound's harmonics are described as its partials are", "[timbre]") {
+TEST_CASE("A sound's harmonics have the descriptors of its partials", "[timbre]") {
   constexpr double b = 1e-3;
   std::vector<double> sound(4096);
   std::vector<double> odd(4096);
@@ -423,7 +423,7 @@ TEST_CASE("A sound's harmonics are described as its partials are", "[timbre]") {
   CHECK_FALSE(find_f0(std::vector<double>(4096), 48000.0));
 }
 
-TEST_CASE("An envelope is the amplitude of what swings", "[timbre]") {
+TEST_CASE("An envelope follows the amplitude of an oscillation", "[timbre]") {
   // A carrier that rises in 10 ms and then falls by 60 dB a second; the low-pass rounds the
   // corners.
   std::vector<double> sound;
@@ -450,7 +450,7 @@ TEST_CASE("An envelope is the amplitude of what swings", "[timbre]") {
   CHECK(std::pow(10.0, shape->log_attack_time) == Approx(0.009).margin(3e-3));
 }
 
-TEST_CASE("Nothing of a frame is NaN", "[timbre]") {
+TEST_CASE("A frame contains no NaN", "[timbre]") {
   FrameAnalysis frames({.rate_hz = 48000.0, .size = 64, .f0_hz = 1500.0});
   const auto silence = frames.next(std::vector<double>(64));
   CHECK(silence.rms == 0.0);
@@ -465,7 +465,7 @@ TEST_CASE("Nothing of a frame is NaN", "[timbre]") {
   CHECK(*frames.next(std::vector<double>(64, 0.5)).flux == Approx(0.0).margin(1e-12));
 }
 
-TEST_CASE("The transform is the sum that it is defined as, of any size", "[timbre]") {
+TEST_CASE("The Fourier transform of any size equals its defining sum", "[timbre]") {
   Random random(9);
   for (const std::size_t size : {2u, 3u, 4u, 6u, 17u, 50u, 64u, 1000u}) {
     std::vector<double> x(size);

@@ -27,7 +27,7 @@ std::string error_of(std::string_view line) {
 
 }  // namespace
 
-TEST_CASE("a command is named by any unique beginning", "[console]") {
+TEST_CASE("commands can be abbreviated to a unique prefix", "[console]") {
   CHECK(parse_command("noteon 60")->name == "noteon");
   CHECK(parse_command("noteon 60")->words == std::vector<std::string>{"60"});
   CHECK(parse_command("st")->name == "status");
@@ -40,7 +40,7 @@ TEST_CASE("a command is named by any unique beginning", "[console]") {
   }
 }
 
-TEST_CASE("an unclear or unknown command is answered with what there is", "[console]") {
+TEST_CASE("an ambiguous or unknown command lists the alternatives", "[console]") {
   CHECK(error_of("n 60") == "'n' could be noteon or noteoff");
   CHECK(has(error_of("s"), "status"));
   const std::string unknown = error_of("jump");
@@ -59,21 +59,21 @@ TEST_CASE("empty lines and comments are commands without a name", "[console]") {
   CHECK(parse_command("noteon 60 # loud")->words == std::vector<std::string>{"60"});
 }
 
-TEST_CASE("quotes hold a word together", "[console]") {
+TEST_CASE("quotes keep a word with blanks together", "[console]") {
   CHECK(parse_command("load \"my model.mdl\"")->words == std::vector<std::string>{"my model.mdl"});
   CHECK(parse_command("load \"a #1.mdl\" # two")->words == std::vector<std::string>{"a #1.mdl"});
   CHECK(parse_command("load take#1.mdl")->words == std::vector<std::string>{"take#1.mdl"});
   CHECK(has(error_of("load \"open end"), "this quote is not closed"));
 }
 
-TEST_CASE("a wrong number of words is told with the command's form", "[console]") {
+TEST_CASE("a wrong number of words prints the command's usage", "[console]") {
   CHECK(has(error_of("set m_K"), "set PARAMETER VALUE"));
   CHECK(has(error_of("noteon"), "noteon KEY [VELOCITY]"));
   CHECK(has(error_of("panic now"), "'panic', found 1 word"));
   CHECK(has(error_of("load my model.mdl"), "quotes"));
 }
 
-TEST_CASE("what is not stable is not loaded, or by force, and no parameter leaves what is",
+TEST_CASE("unstable models load only with --force, and parameters stay in the stable range",
           "[console]") {
   const Folder folder;
   Harness harness;
@@ -103,7 +103,7 @@ TEST_CASE("what is not stable is not loaded, or by force, and no parameter leave
   CHECK(has(error_of("load wild --farce"), "load MODEL [--force]"));
 }
 
-TEST_CASE("help names every command, and tells more of each", "[console]") {
+TEST_CASE("help lists and explains every command", "[console]") {
   Harness harness;
   const std::string all = harness.say("help");
   for (const Row* const row : command_rows()) {
@@ -136,7 +136,7 @@ TEST_CASE("the examples of help are commands that work", "[console]") {
   CHECK(tried == 3);
 }
 
-TEST_CASE("the last word of a line is completed by what may stand there", "[console]") {
+TEST_CASE("the last word of a line is completed", "[console]") {
   const Folder folder;
   Harness harness;
   harness.say("load " + write_triangle(folder));
@@ -171,7 +171,7 @@ TEST_CASE("files are completed, with folders and blanks", "[console]") {
   CHECK(harness.console.completions("load " + here + "none/").empty());
 }
 
-TEST_CASE("load tells what was loaded, with its warnings", "[console]") {
+TEST_CASE("load prints the model and its warnings", "[console]") {
   const Folder folder;
   Harness harness;
   const std::string told = harness.say("load " + write_triangle(folder));
@@ -179,7 +179,8 @@ TEST_CASE("load tells what was loaded, with its warnings", "[console]") {
   CHECK(has(told, folder.file("triangle.mdl") + ":10:1: warning: "));
 }
 
-TEST_CASE("a file with an error is told with its place, and the sound goes on", "[console]") {
+TEST_CASE("an error in a file is reported with its position, and the sound continues",
+          "[console]") {
   const Folder folder;
   Harness harness;
   harness.say("load " + write_triangle(folder));
@@ -190,7 +191,7 @@ TEST_CASE("a file with an error is told with its place, and the sound goes on", 
   CHECK(has(harness.say("load " + folder.file("none.mdl")), "there is no model or preset"));
 }
 
-TEST_CASE("set turns a parameter within its range, get tells it", "[console]") {
+TEST_CASE("set limits a parameter to its range, get prints it", "[console]") {
   const Folder folder;
   Harness harness;
   harness.say("load " + write_triangle(folder));
@@ -238,7 +239,7 @@ TEST_CASE("noteon sounds and panic silences", "[console]") {
   CHECK(has(harness.say("noteon 128"), "error: the key must lie between 0 and 127"));
 }
 
-TEST_CASE("pluck and bow go to the first input that knows them", "[console]") {
+TEST_CASE("pluck and bow use the first input that accepts them", "[console]") {
   const Folder folder;
   Harness harness;
   harness.say("load " + folder.write("pluck.mdl", scenes::plucked_harmonics()));
@@ -266,7 +267,7 @@ TEST_CASE("pluck and bow go to the first input that knows them", "[console]") {
   CHECK(timed.event.value2 == 0.25);
 }
 
-TEST_CASE("a full ring is told, not waited for", "[console]") {
+TEST_CASE("a full queue is reported without waiting", "[console]") {
   const Folder folder;
   Harness harness;
   harness.say("load " + write_triangle(folder));
@@ -279,7 +280,7 @@ TEST_CASE("a full ring is told, not waited for", "[console]") {
   CHECK(harness.say("noteon 60").empty());
 }
 
-TEST_CASE("without a model the commands say how to get one", "[console]") {
+TEST_CASE("without a model the commands explain how to load one", "[console]") {
   Harness harness;
   for (const char* line :
        {"noteon 60", "pluck", "bow 1", "params", "get x", "set x 1", "explain"}) {
@@ -289,7 +290,7 @@ TEST_CASE("without a model the commands say how to get one", "[console]") {
   CHECK(has(harness.say("status"), "model   none"));
 }
 
-TEST_CASE("explain tells what is computed and what plays it", "[console]") {
+TEST_CASE("explain prints the plan and the controls", "[console]") {
   const Folder folder;
   Harness harness;
   harness.say("load " + write_triangle(folder));
@@ -322,14 +323,14 @@ TEST_CASE("a script runs line by line and stops at the first error", "[console]"
   CHECK(harness.session.parameter("m_K") == 0.05);
 }
 
-TEST_CASE("quit ends, other commands do not", "[console]") {
+TEST_CASE("only quit ends the console", "[console]") {
   Harness harness;
   CHECK(harness.console.run_line("status"));
   CHECK(harness.console.run_line("jump"));
   CHECK_FALSE(harness.console.run_line("quit"));
 }
 
-TEST_CASE("the keys play notes as on a piano", "[console]") {
+TEST_CASE("the letter keys play notes", "[console]") {
   const Folder folder;
   Harness harness;
   CHECK(has(harness.say("keys"), "needs a terminal"));

@@ -70,7 +70,7 @@ struct Harness {
 
 // --- who may send -------------------------------------------------------------------------------
 
-TEST_CASE("those who may send are written as addresses and networks", "[osc_access]") {
+TEST_CASE("allowed senders are parsed as addresses and networks", "[osc_access]") {
   const auto subnets = parse_subnets("192.168.1.77/24,10.0.0.5,172.16.0.0/12");
   REQUIRE(subnets);
   REQUIRE(subnets->size() == 3);
@@ -98,7 +98,7 @@ TEST_CASE("those who may send are written as addresses and networks", "[osc_acce
   }
 }
 
-TEST_CASE("the network is let in for those who are named, and no others", "[osc_access]") {
+TEST_CASE("only named network senders are accepted", "[osc_access]") {
   CHECK(refusal({}) == "");
   CHECK(refusal({.bind_address = "127.0.0.2"}) == "");
   CHECK(contains(refusal({.bind_address = "0.0.0.0"}),
@@ -114,7 +114,7 @@ TEST_CASE("the network is let in for those who are named, and no others", "[osc_
             ->access() == "open to this machine and 10.0.0.0/8, 10.1.2.3");
 }
 
-TEST_CASE("packets of others are counted and told, not heard", "[osc_access]") {
+TEST_CASE("packets from other senders are counted and ignored", "[osc_access]") {
   // An address of this machine's that is not 127.x, which others could have.
   std::uint32_t own = 0;
   ifaddrs* all = nullptr;
@@ -157,7 +157,7 @@ TEST_CASE("packets of others are counted and told, not heard", "[osc_access]") {
 
 // --- how much is answered -----------------------------------------------------------------------
 
-TEST_CASE("whoever floods gets back what he sent and a budget", "[osc_access]") {
+TEST_CASE("replies are limited to the bytes received plus a budget", "[osc_access]") {
   constexpr std::size_t question = 16;
   constexpr std::size_t answer = 1596;
   constexpr int seconds = 10;
@@ -189,7 +189,7 @@ TEST_CASE("whoever floods gets back what he sent and a budget", "[osc_access]") 
   CHECK(tellings <= pauses);
 }
 
-TEST_CASE("what has begun is answered whole, and owed", "[osc_access]") {
+TEST_CASE("a started reply is sent whole and charged to the budget", "[osc_access]") {
   AnswerBudget budget;
   const OscSender sender{0x0a000001, 4000};
   CHECK(budget.may_answer(sender, 0));
@@ -204,7 +204,7 @@ TEST_CASE("what has begun is answered whole, and owed", "[osc_access]") {
   CHECK(budget.tell_pause_s(sender, 2001 * ms) > 0.0);
 }
 
-TEST_CASE("a liar's ports have one budget, this machine's one each", "[osc_access]") {
+TEST_CASE("remote ports share a budget, local ports have their own", "[osc_access]") {
   AnswerBudget budget;
   budget.answered({0x0a000001, 1}, 70000, 0);
   CHECK_FALSE(budget.may_answer({0x0a000001, 2}, 0));
@@ -214,7 +214,7 @@ TEST_CASE("a liar's ports have one budget, this machine's one each", "[osc_acces
   CHECK(budget.may_answer({0x7f000001, 2}, 0));
 }
 
-TEST_CASE("any number of senders takes the memory of some", "[osc_access]") {
+TEST_CASE("memory is limited for any number of senders", "[osc_access]") {
   AnswerBudget budget;
   for (std::uint32_t i = 0; i < 100'000; ++i) {
     budget.received({0x0a000000 + i, 1}, 16, 0);
@@ -232,7 +232,7 @@ TEST_CASE("any number of senders takes the memory of some", "[osc_access]") {
   CHECK(budget.may_answer({0x0c000000, 1}, 1000 * ms));  // who has paid makes room
 }
 
-TEST_CASE("an answer of many rows goes in portions", "[osc_access]") {
+TEST_CASE("a reply of many rows is sent in portions", "[osc_access]") {
   const int receiver = socket(AF_INET, SOCK_DGRAM, 0);
   sockaddr_in address{};
   address.sin_family = AF_INET;
@@ -269,7 +269,7 @@ TEST_CASE("an answer of many rows goes in portions", "[osc_access]") {
   close(receiver);
 }
 
-TEST_CASE("a description of a thousand parameters comes whole and in order", "[osc_access]") {
+TEST_CASE("a description of a thousand parameters arrives complete and in order", "[osc_access]") {
   Harness harness;
   std::string text;
   const std::string stem = "p" + std::string(60, '_');
@@ -300,7 +300,7 @@ TEST_CASE("a description of a thousand parameters comes whole and in order", "[o
   CHECK(harness.process.from_osc.size() == 1);
 }
 
-TEST_CASE("a flood of questions is not answered with a larger one", "[osc_access]") {
+TEST_CASE("a flood of queries is not amplified", "[osc_access]") {
   Harness harness;
   const std::int64_t start_ns = monotonic_ns();
   const Bytes question = message("/describe");
@@ -342,7 +342,7 @@ TEST_CASE("packets that the system lost are counted", "[osc_access]") {
 
 // --- what a packet reaches ----------------------------------------------------------------------
 
-TEST_CASE("packets load what is below the program's folders", "[osc_access]") {
+TEST_CASE("packets load only files below the program's folders", "[osc_access]") {
   namespace fs = std::filesystem;
   Harness harness;
   const fs::path outside = harness.data.path().string() + "_outside";
@@ -414,7 +414,7 @@ TEST_CASE("packets load what is below the program's folders", "[osc_access]") {
   fs::remove_all(outside);
 }
 
-TEST_CASE("no word of a file is in an answer", "[osc_access]") {
+TEST_CASE("replies contain no text of a file", "[osc_access]") {
   Harness harness;
   const std::string rest = "@out1 posOutput @m\n";
   const std::string mass = "@m mass 1. 0. 0.\n";

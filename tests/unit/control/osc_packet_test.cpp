@@ -7,7 +7,7 @@
 namespace ressort::osc_packet_test {
 namespace {
 
-TEST_CASE("check_packet gives the messages of good packets", "[osc_packet]") {
+TEST_CASE("check_packet returns the messages of valid packets", "[osc_packet]") {
   const Bytes single = RAW("/a\0\0,i\0\0\0\0\0\7");
   const auto one = check_packet(single);
   REQUIRE(one);
@@ -39,7 +39,7 @@ TEST_CASE("check_packet gives the messages of good packets", "[osc_packet]") {
   CHECK((*nested)[2].bytes[1] == 'c');
 }
 
-TEST_CASE("check_packet refuses every kind of bad packet", "[osc_packet]") {
+TEST_CASE("check_packet rejects every kind of invalid packet", "[osc_packet]") {
   const auto refused = [](const Bytes& bytes, std::string_view because) {
     const auto result = check_packet(bytes);
     INFO(because);

@@ -50,7 +50,7 @@ float value(const Answer& answer) {
 
 }  // namespace
 
-TEST_CASE("who has subscribed hears of every change, whoever makes it", "[osc_subscribe]") {
+TEST_CASE("subscribers receive every change from any source", "[osc_subscribe]") {
   OscHarness osc;
   Harness& h = osc.harness;
   Client listener(osc.server->port());
@@ -135,7 +135,7 @@ TEST_CASE("models and presets are listed over OSC, and saved", "[osc_subscribe]"
   CHECK(has(osc.news, "OSC saved"));
 }
 
-TEST_CASE("an error of OSC is told at the machine, too", "[osc_subscribe]") {
+TEST_CASE("an OSC error is logged locally, too", "[osc_subscribe]") {
   OscHarness osc;
   Client client(osc.server->port());
   CHECK(client.ask(message("/nowhere")).address == "/error");
@@ -144,7 +144,7 @@ TEST_CASE("an error of OSC is told at the machine, too", "[osc_subscribe]") {
   CHECK(has(osc.news, "OSC: /nowhere: unknown address"));
 }
 
-TEST_CASE("a velocity is MIDI's as a whole number, a share as a float", "[osc_subscribe]") {
+TEST_CASE("an integer velocity is MIDI's, a float is a share", "[osc_subscribe]") {
   OscHarness osc;
   const auto current = osc.harness.session.current();
   const auto velocity = [&](double number, const std::string& types) {

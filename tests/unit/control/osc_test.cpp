@@ -111,7 +111,7 @@ bool has(const Answer& answer, std::string_view address, std::string_view about,
 
 // --- the server ---------------------------------------------------------------------------------
 
-TEST_CASE("a parameter is set and asked for over OSC", "[osc]") {
+TEST_CASE("a parameter is set and queried over OSC", "[osc]") {
   Harness harness;
   Client& client = harness.client;
   CHECK(std::get<float>(client.ask(message("/param/m_K")).values.at(0)) == 0.02f);
@@ -137,7 +137,7 @@ TEST_CASE("a parameter is set and asked for over OSC", "[osc]") {
   CHECK(has(client.ask(message("/" + std::string(300, 'a'))), "/error", "", "255"));
 }
 
-TEST_CASE("what is beyond what is stable is told over OSC, and where that ends", "[osc]") {
+TEST_CASE("OSC reports values beyond the stable range, and the limit", "[osc]") {
   const DataFolder data;
   data.write("models/one.mdl", "@K param 1.\n@o osc 1. K 0. 0. 0.\n@out1 posOutput @o\n");
   Process process(44100.0, false);
@@ -158,7 +158,7 @@ TEST_CASE("what is beyond what is stable is told over OSC, and where that ends",
   CHECK(has(client.ask(message("/param/L/range")), "/error", "/param/L/range", "no such"));
 }
 
-TEST_CASE("status and describe answer in full", "[osc]") {
+TEST_CASE("status and describe reply in full", "[osc]") {
   Harness harness;
   harness.drive(1);
   const Answer status = harness.client.ask(message("/status"));
@@ -243,7 +243,7 @@ TEST_CASE("the messages of a bundle act together", "[osc]") {
   CHECK(first.when == second.when);
 }
 
-TEST_CASE("time tags keep their distance to the frame", "[osc]") {
+TEST_CASE("time tags keep their distances to the frame", "[osc]") {
   Harness harness;
   CHECK(has(harness.client.ask(bundle(harness.tag(harness.time_ns(0)), {message("/panic")})),
             "/error", "/panic", "no audio"));
@@ -302,7 +302,7 @@ TEST_CASE("time tags follow the clock when the audio has stood still", "[osc]") 
   CHECK(std::abs(onsets[1] - 21600) < 48);
 }
 
-TEST_CASE("a taken port and a wrong address are told apart", "[osc]") {
+TEST_CASE("a port in use and a wrong address give different errors", "[osc]") {
   Harness harness;
   const auto second =
       OscServer::open({.port = harness.server->port()}, harness.process, harness.session, {});
@@ -325,7 +325,7 @@ TEST_CASE("a taken port and a wrong address are told apart", "[osc]") {
   CHECK(OscServer::open({.port = port}, harness.process, harness.session, {}));
 }
 
-TEST_CASE("loading answers done or fail, with the asker's number", "[osc]") {
+TEST_CASE("loading replies done or fail with the client's ID", "[osc]") {
   Harness harness;
   const Answer done = harness.client.ask(message("/model/load", {"two", 7}));
   CHECK(done.address == "/done");
@@ -351,7 +351,7 @@ TEST_CASE("loading answers done or fail, with the asker's number", "[osc]") {
   CHECK(harness.session.load_and_wait("two"));
 }
 
-TEST_CASE("a full queue refuses, and takes again when there is room", "[osc]") {
+TEST_CASE("a full queue rejects events until there is room", "[osc]") {
   Harness harness;
   const Bytes many = bundle(1, std::vector<Bytes>(1500, message("/bend", {0.5f})));
   bool was_refused = false;
@@ -369,8 +369,7 @@ TEST_CASE("a full queue refuses, and takes again when there is room", "[osc]") {
   CHECK(harness.client.sync().empty());
 }
 
-TEST_CASE("a bundle that finds no room ahead is refused whole; what is to act now is taken",
-          "[osc]") {
+TEST_CASE("a bundle without room is rejected whole, and immediate events are accepted", "[osc]") {
   Harness harness;
   harness.drive(1);
   const std::vector<Bytes> pushes(1500, message("/in/1/force", {0.1}));
@@ -398,7 +397,7 @@ TEST_CASE("a bundle that finds no room ahead is refused whole; what is to act no
   CHECK(harness.client.sync().empty());
 }
 
-TEST_CASE("lateness is answered once in a while, with how often it was", "[osc]") {
+TEST_CASE("late events are reported at intervals with their number", "[osc]") {
   Harness harness;
   harness.drive(200);
   const std::int64_t start_ns = monotonic_ns();
@@ -417,7 +416,7 @@ TEST_CASE("lateness is answered once in a while, with how often it was", "[osc]"
   CHECK(answers <= (monotonic_ns() - start_ns) / 1'000'000'000 + 2);
 }
 
-TEST_CASE("answers are not answered, and rubbish seldom", "[osc]") {
+TEST_CASE("replies get no reply, and malformed packets few", "[osc]") {
   Harness harness;
   harness.client.send(message("/error", {"/a", "b"}));
   harness.client.send(bundle(1, {message("/done"), message("/status.reply")}));
@@ -436,7 +435,7 @@ TEST_CASE("answers are not answered, and rubbish seldom", "[osc]") {
   CHECK(answers <= 10 * ((monotonic_ns() - start_ns) / 1'000'000'000 + 2));
 }
 
-TEST_CASE("ten thousand broken packets leave the server and the sound whole", "[osc]") {
+TEST_CASE("ten thousand malformed packets do not disturb the server or the sound", "[osc]") {
   Harness harness;
   harness.drive(1);
   const std::vector<Bytes> seeds = {

@@ -129,7 +129,7 @@ TEST_CASE("every playing address becomes its event", "[registry]") {
   check(event("/brightness 1"), EventKind::custom, 3, 1.0, 9);
 }
 
-TEST_CASE("a mass is struck by its name, those of strings and meshes by numbers", "[registry]") {
+TEST_CASE("masses are struck by name, those of macros by number", "[registry]") {
   Preset preset;
   preset.controls = {{.target = "in1", .gesture = Gesture::impulse, .low = 0.1, .high = 0.4}};
   const auto compiled =
@@ -172,7 +172,7 @@ TEST_CASE("a mass is struck by its name, those of strings and meshes by numbers"
         "/mass/a/strike: the strength must lie between -1 and 1, found 1.1");
 }
 
-TEST_CASE("what an input gives cannot be set", "[registry]") {
+TEST_CASE("a parameter driven by an input cannot be set", "[registry]") {
   const auto compiled =
       compile_network(network_of("@K audioParam @in2\n@Z param 0.1\n@o osc 1 K Z 0 0\n"), {}, {});
   REQUIRE(compiled);
@@ -186,7 +186,7 @@ TEST_CASE("what an input gives cannot be set", "[registry]") {
   CHECK((*all)[0].index == 1);
 }
 
-TEST_CASE("a parameter keeps to its range, and a pattern reaches several", "[registry]") {
+TEST_CASE("a parameter is limited to its range, and a pattern matches several", "[registry]") {
   CHECK(event("/param/s_K 5").value == 0.2);
   CHECK(event("/param/s_K -5").value == 0.05);
   const auto events = to_events(call("/param/s_[KZ] 0.06"), instrument(), 9);
@@ -200,7 +200,7 @@ TEST_CASE("a parameter keeps to its range, and a pattern reaches several", "[reg
   check_error("/model/load x", "unknown address '/model/load'; /describe lists all addresses");
 }
 
-TEST_CASE("what cannot be played is told, and what was expected", "[registry]") {
+TEST_CASE("unplayable messages are reported with what was expected", "[registry]") {
   check_error("/nowhere 1", "unknown address '/nowhere'; /describe lists all addresses");
   check_error("/note/on", "/note/on: the key is missing");
   check_error("/note/on 128", "/note/on: the key must lie between 0 and 127, found 128");
@@ -245,7 +245,7 @@ TEST_CASE("what cannot be played is told, and what was expected", "[registry]") 
   REQUIRE_FALSE(to_events(call("/in/1/position 0"), Instrument{}, 1));
 }
 
-TEST_CASE("every row is found by its address and can be said somewhere", "[registry]") {
+TEST_CASE("every row is found by its address and has an interface", "[registry]") {
   std::set<std::string> seen;
   for (const Row& row : rows()) {
     CAPTURE(row.address, row.command);
@@ -289,8 +289,7 @@ TEST_CASE("every row is found by its address and can be said somewhere", "[regis
   CHECK_FALSE(is_reserved("/finger"));
 }
 
-TEST_CASE("every gesture that can be said has an address, and a preset's word is its name",
-          "[registry]") {
+TEST_CASE("every live gesture has an address and is named as in presets", "[registry]") {
   for (const GestureRow& gesture : gestures) {
     const Row* const row = find_row("/in/1/" + std::string(gesture.name)).row;
     REQUIRE((row != nullptr) == (gesture.live != Live::never));
@@ -304,7 +303,7 @@ TEST_CASE("every gesture that can be said has an address, and a preset's word is
   }
 }
 
-TEST_CASE("words are divided by blanks, and quotes hold them together", "[registry]") {
+TEST_CASE("words are split at blanks outside quotes", "[registry]") {
   using Words = std::vector<std::string>;
   CHECK(split_words("") == Words{});
   CHECK(split_words(" \t ") == Words{});
@@ -326,7 +325,7 @@ TEST_CASE("words are divided by blanks, and quotes hold them together", "[regist
   CHECK(to_argument("nan") == Argument{std::string("nan")});
 }
 
-TEST_CASE("a score is times and addresses", "[registry]") {
+TEST_CASE("a score line is a time and an address", "[registry]") {
   const auto score = parse_score(
       "# a score\n"
       "0 /note/on 60 100\n"
@@ -365,7 +364,7 @@ TEST_CASE("a score is times and addresses", "[registry]") {
   wrong("\t soon", 1, 3, "found 'soon' where a time in seconds was expected, at most a day");
 }
 
-TEST_CASE("patterns fit as OSC says", "[registry]") {
+TEST_CASE("patterns match according to the OSC specification", "[registry]") {
   CHECK(fits("/a/b", "/a/b"));
   CHECK_FALSE(fits("/a/b", "/a/bc"));
   CHECK_FALSE(fits("/a/bc", "/a/b"));
@@ -392,7 +391,7 @@ TEST_CASE("patterns fit as OSC says", "[registry]") {
   CHECK(fits("**", "abc"));
 }
 
-TEST_CASE("no pattern takes long or leaves its text", "[registry]") {
+TEST_CASE("patterns match in bounded time and memory", "[registry]") {
   // The test's time limit is what an exponential search would break.
   const std::string name(5000, 'a');
   std::string stars;

@@ -45,7 +45,7 @@ std::string squeezed(const std::string& text) {
 
 }  // namespace
 
-TEST_CASE("the console shapes what sounds, and takes it back at once", "[shape_told]") {
+TEST_CASE("the console shapes the current sound, and undo reverts it", "[shape_told]") {
   StringHarness fixture;
   Harness& h = fixture.harness;
   const std::string told = h.say("shape f0 300 t60 2");
@@ -65,7 +65,7 @@ TEST_CASE("the console shapes what sounds, and takes it back at once", "[shape_t
   CHECK(has(high, "k is at its highest"));
 }
 
-TEST_CASE("keys are in tune when what sounds was shaped", "[shape_told]") {
+TEST_CASE("keys stay in tune after shaping", "[shape_told]") {
   const Folder folder;
   Harness h;
   h.say("load " + write_triangle(folder));
@@ -94,7 +94,7 @@ TEST_CASE("keys are in tune when what sounds was shaped", "[shape_told]") {
   CHECK(pitch_hz() == Approx(440.0).margin(a_tenth_of_a_cent));
 }
 
-TEST_CASE("an attack is told, and asked for like the rest", "[shape_told]") {
+TEST_CASE("an attack can be printed and requested", "[shape_told]") {
   StringHarness fixture;
   Harness& h = fixture.harness;
   const std::string told = squeezed(h.say("shape t60 2"));
@@ -106,7 +106,7 @@ TEST_CASE("an attack is told, and asked for like the rest", "[shape_told]") {
   CHECK(has(h.say("shape attack 0"), "must be a number above 0"));
 }
 
-TEST_CASE("the console refuses what cannot be asked for", "[shape_told]") {
+TEST_CASE("the console rejects invalid targets", "[shape_told]") {
   Harness idle;
   CHECK(has(idle.say("shape t60 3"), "no model is loaded"));
   StringHarness fixture;
@@ -127,7 +127,7 @@ TEST_CASE("the console refuses what cannot be asked for", "[shape_told]") {
   CHECK(has(h.say("shape t60 3"), "is not linear: here is a bow"));
 }
 
-TEST_CASE("OSC shapes what sounds and answers with figures", "[shape_told]") {
+TEST_CASE("OSC shapes the current sound and replies with figures", "[shape_told]") {
   StringHarness fixture;
   auto server = OscServer::open({.port = 0}, fixture.harness.process, fixture.harness.session, {});
   REQUIRE(server);

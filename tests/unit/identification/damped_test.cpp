@@ -9,7 +9,7 @@ namespace ressort::damped_test {
 
 using namespace support;
 
-TEST_CASE("Power sums are the sums, near 1 and far from it", "[damped]") {
+TEST_CASE("Power sums equal direct summation, near 1 and far from it", "[damped]") {
   Random random(1);
   for (int round = 0; round < 200; ++round) {
     const std::size_t count = 1 + random.below(3000);
@@ -34,7 +34,7 @@ TEST_CASE("Power sums are the sums, near 1 and far from it", "[damped]") {
   }
 }
 
-TEST_CASE("Damped sinusoids and moments are as they are written", "[damped]") {
+TEST_CASE("Damped sinusoids and moments equal their definitions", "[damped]") {
   const Complex log_z(-0.01, 0.7);
   const Complex c(0.3, -1.1);
   std::vector<double> sound(1000, 0.25);
@@ -52,7 +52,7 @@ TEST_CASE("Damped sinusoids and moments are as they are written", "[damped]") {
   CHECK(std::abs(moments.first - first) < 1e-10);
 }
 
-TEST_CASE("The spectrum's power is the sound's, and white noise's density its variance",
+TEST_CASE("Spectral power equals signal power, and white noise's density its variance",
           "[damped]") {
   Random random(2);
   const std::vector<std::vector<double>> noise = {
@@ -68,7 +68,7 @@ TEST_CASE("The spectrum's power is the sound's, and white noise's density its va
   CHECK(power.between(0.5, 1.0) == Approx(0.25 * 0.5 / std::numbers::pi).epsilon(0.1));
 }
 
-TEST_CASE("A fit finds the modes from wrong starts, and never gets worse", "[damped]") {
+TEST_CASE("A fit converges from wrong starts and never gets worse", "[damped]") {
   const std::vector<KnownMode> known = {{440.0, 2.0, 1.0, 0.3}, {660.0, 1.0, 0.5, 1.0}};
   const std::vector<std::vector<double>> sound = {ringing(known, 1.0)};
   const auto pole = [](double hertz, double t60_s) {

@@ -36,7 +36,7 @@ std::vector<double> white(std::size_t frames, std::uint64_t seed) {
 
 }  // namespace
 
-TEST_CASE("IR-T1: thirty modes without noise are found to the last digits", "[identify]") {
+TEST_CASE("IR-T1: thirty modes without noise are found to rounding precision", "[identify]") {
   const std::uint64_t seed = GENERATE(11u, 12u);
   INFO("seed " << seed);
   const std::vector<KnownMode> known = thirty(seed);
@@ -49,7 +49,7 @@ TEST_CASE("IR-T1: thirty modes without noise are found to the last digits", "[id
   CHECK(found.residual_db < -200.0);  // IR-T9: -60 dB
 }
 
-TEST_CASE("IR-T2: 16 bits", "[identify]") {
+TEST_CASE("IR-T2: modes are found in a 16-bit recording", "[identify]") {
   const std::uint64_t seed = GENERATE(21u, 22u);
   INFO("seed " << seed);
   const std::vector<KnownMode> known = thirty(seed);
@@ -60,8 +60,8 @@ TEST_CASE("IR-T2: 16 bits", "[identify]") {
 }
 
 TEST_CASE(
-    "IR-T3, IR-T9: in noise every mode is within 5 times the Cramer-Rao bound, and no more is "
-    "explained than there is",
+    "IR-T3, IR-T9: in noise every mode is within 5 times the Cramer-Rao bound, and no "
+    "noise is explained",
     "[identify]") {
   const auto snr_db = GENERATE(60.0, 40.0);
   INFO("SNR " << snr_db);
@@ -92,7 +92,7 @@ TEST_CASE(
   CHECK(found.residual_db > noise_db - 0.5);
 }
 
-TEST_CASE("IR-T4: two modes half a hertz apart are two", "[identify]") {
+TEST_CASE("IR-T4: two modes half a hertz apart are resolved", "[identify]") {
   const std::uint64_t seed = GENERATE(41u, 42u, 43u);
   INFO("seed " << seed);
   Random random(seed);
@@ -103,7 +103,7 @@ TEST_CASE("IR-T4: two modes half a hertz apart are two", "[identify]") {
   CHECK(worst.t60_percent < 1.0);
 }
 
-TEST_CASE("IR-T5: modes of a T60 of 10 to 50 ms, in a short file, a long one, and under noise",
+TEST_CASE("IR-T5: modes with a T60 of 10 to 50 ms are found in short, long and noisy files",
           "[identify]") {
   CHECK(worst_of(damped, identified({ringing(damped, 0.09)})).frequency_hz < 1e-6);
   CHECK(worst_of(damped, identified({ringing(damped, 3.0)})).frequency_hz < 1e-6);
@@ -115,7 +115,7 @@ TEST_CASE("IR-T5: modes of a T60 of 10 to 50 ms, in a short file, a long one, an
   CHECK(worst.t60_percent < 2.0);
 }
 
-TEST_CASE("Strongly damped modes beside long ones in noise are all found", "[identify]") {
+TEST_CASE("Strongly damped modes are found beside long ones in noise", "[identify]") {
   std::vector<KnownMode> known = thirty(55);
   for (KnownMode mode : damped) {
     mode.frequency_hz *= 1.0371;
@@ -131,7 +131,8 @@ TEST_CASE("Strongly damped modes beside long ones in noise are all found", "[ide
   CHECK(worst.t60_percent < 2.0);
 }
 
-TEST_CASE("IR-T6: silence before, two channels, another sign, other rates", "[identify]") {
+TEST_CASE("IR-T6: leading silence, two channels, inverted sign and other rates are handled",
+          "[identify]") {
   const std::vector<KnownMode> known = thirty(61);
   const std::vector<double> clean = ringing(known, 3.0);
   const auto check = [&](const Identification& found, double blow_s) {
@@ -183,7 +184,7 @@ TEST_CASE("IR-T6: silence before, two channels, another sign, other rates", "[id
   }
 }
 
-TEST_CASE("IR-T7: in noise nothing rings, and that is said", "[identify]") {
+TEST_CASE("IR-T7: noise alone gives an error", "[identify]") {
   const std::string nothing = "nothing in it rings: no decaying tone rises out of its noise";
   SECTION("white, at many rates") {
     for (const double rate_hz : {8000.0, 44100.0, 96000.0}) {
@@ -219,7 +220,7 @@ TEST_CASE("IR-T7: in noise nothing rings, and that is said", "[identify]") {
   }
 }
 
-TEST_CASE("Hum and an offset are left out, and said", "[identify]") {
+TEST_CASE("Hum and an offset are removed with a warning", "[identify]") {
   const std::vector<KnownMode> known = {{440.0, 1.0, 1.0, 0.0}};
   Random random(81);
   std::vector<double> sound = with_noise(ringing(known, 3.0), 1e-3, random);
@@ -236,7 +237,7 @@ TEST_CASE("Hum and an offset are left out, and said", "[identify]") {
   CHECK(found.warnings[1] == "a tone that cannot be seen to decay is left out, at 50.0 Hz");
 }
 
-TEST_CASE("What is clipped is concluded from what follows", "[identify]") {
+TEST_CASE("Clipped samples are extrapolated from the sound after them", "[identify]") {
   const std::vector<KnownMode> known = thirty(82);
   std::vector<double> sound = ringing(known, 3.0);
   const double most = 0.25 * peak_of(sound);
@@ -250,7 +251,7 @@ TEST_CASE("What is clipped is concluded from what follows", "[identify]") {
   CHECK(worst_of(known, found).amplitude_db < 1e-3);
 }
 
-TEST_CASE("A blow that lasts does not change what rings", "[identify]") {
+TEST_CASE("A long contact does not change the modes", "[identify]") {
   // A hammer that stays 2 ms: half a sine, with noise.
   const std::vector<KnownMode> known = {{230.0, 3.0, 0.5, 0.0},
                                         {641.0, 2.0, 0.4, 0.0},
@@ -280,7 +281,7 @@ TEST_CASE("A blow that lasts does not change what rings", "[identify]") {
   CHECK(found.residual_db < -30.0);
 }
 
-TEST_CASE("What each number is said to be uncertain by is what it is off", "[identify]") {
+TEST_CASE("Stated uncertainties match the errors", "[identify]") {
   const std::vector<KnownMode> known = {{200.0, 2.0, 1.0, 0.4},  {203.0, 1.5, 0.5, 2.0},
                                         {700.0, 1.0, 0.6, -1.0}, {1500.0, 0.5, 0.4, 1.3},
                                         {4000.0, 0.2, 0.5, 0.0}, {9000.0, 0.1, 0.6, -2.0}};
@@ -311,7 +312,7 @@ TEST_CASE("What each number is said to be uncertain by is what it is off", "[ide
   }
 }
 
-TEST_CASE("Fewer modes are those with most energy, and none below the floor", "[identify]") {
+TEST_CASE("A mode limit keeps the strongest modes, none below the floor", "[identify]") {
   const std::vector<KnownMode> known = {{300.0, 1.0, 1.0, 0.0},      // energy 0 dB
                                         {500.0, 0.1, 1.0, 0.0},      // -10 dB
                                         {800.0, 1.0, 0.1, 0.0},      // -20 dB
@@ -334,7 +335,7 @@ TEST_CASE("Fewer modes are those with most energy, and none below the floor", "[
   }
 }
 
-TEST_CASE("What cannot be used is refused in words", "[identify]") {
+TEST_CASE("Unusable recordings are rejected with the reason", "[identify]") {
   CHECK(refusal({}) == "there are no samples in it");
   CHECK(refusal({{}}) == "there are no samples in it");
   CHECK(refusal({std::vector<double>(44100)}) == "it is silent: every sample is the same");
@@ -353,7 +354,7 @@ TEST_CASE("What cannot be used is refused in words", "[identify]") {
   CHECK(refusal({late}) == "it ends 0.01 s after the blow; at least 0.02 s of ringing are needed");
 }
 
-TEST_CASE("It can be stopped at any time", "[identify]") {
+TEST_CASE("Identification can be cancelled at any time", "[identify]") {
   const Recording recording{44100.0, {ringing(thirty(85), 1.0)}};
   std::size_t looks = 0;
   const Progress counting([&](std::string_view) { return ++looks > 0; });
@@ -368,7 +369,7 @@ TEST_CASE("It can be stopped at any time", "[identify]") {
   }
 }
 
-TEST_CASE("A body of what was found answers one impulse with the recording", "[identify]") {
+TEST_CASE("A body made from a recording reproduces it after one impulse", "[identify]") {
   // All from rest, some the other way round, heard in two places.
   std::vector<KnownMode> known = thirty(91);
   std::vector<KnownMode> other = known;

@@ -34,7 +34,7 @@ using namespace std::chrono_literals;
 
 // --- who is let in ------------------------------------------------------------------------------
 
-TEST_CASE("hosts and origins are compared whole", "[panel_http]") {
+TEST_CASE("hosts and origins must match exactly", "[panel_http]") {
   const PanelAccess access(9788, {}, "secret", false);
   for (const char* const host : {"127.0.0.1:9788", "localhost:9788", "[::1]:9788"}) {
     CHECK(access.is_host(host));
@@ -58,7 +58,7 @@ TEST_CASE("hosts and origins are compared whole", "[panel_http]") {
   CHECK_FALSE(PanelAccess(80, {"10.0.0.5"}, "", true).is_host("10.0.0.50:80"));
 }
 
-TEST_CASE("tokens are random, and compared whole", "[panel_http]") {
+TEST_CASE("tokens are random and must match exactly", "[panel_http]") {
   std::set<std::string> tokens;
   for (int i = 0; i < 1000; ++i) {
     const std::string token = make_token();
@@ -178,7 +178,7 @@ struct Stage {
   std::thread audio;
 };
 
-TEST_CASE("a request that a page from elsewhere could make is refused", "[panel_http]") {
+TEST_CASE("requests that a foreign page could make are refused", "[panel_http]") {
   const Stage stage;
   CHECK(stage.status(stage.get("/")) == 200);
   CHECK(stage.status(stage.get("/describe", "Origin: http://" + stage.host + "\r\n")) == 200);
@@ -218,7 +218,7 @@ TEST_CASE("a request that a page from elsewhere could make is refused", "[panel_
   CHECK(page.find("Set-Cookie") == page.npos);
 }
 
-TEST_CASE("a body is bytes of a known and small length", "[panel_http]") {
+TEST_CASE("a request body must have a known, small length", "[panel_http]") {
   const Stage stage;
   const std::string head = "POST /osc HTTP/1.1\r\nHost: " + stage.host + "\r\n";
   const std::string octets = "Content-Type: application/octet-stream\r\n";
@@ -243,7 +243,7 @@ TEST_CASE("a body is bytes of a known and small length", "[panel_http]") {
   CHECK(said.find("/error") != said.npos);
 }
 
-TEST_CASE("a packet by HTTP does what it does by UDP", "[panel_http]") {
+TEST_CASE("a packet by HTTP acts like one by UDP", "[panel_http]") {
   Stage stage;
   CHECK(stage.status(stage.post(message("/param/m_K", {0.015f}))) == 200);
   CHECK(stage.session.parameter("m_K") == static_cast<double>(0.015f));
@@ -273,7 +273,7 @@ TEST_CASE("a packet by HTTP does what it does by UDP", "[panel_http]") {
   close(listener);
 }
 
-TEST_CASE("what is drawn comes with its places, and four may watch", "[panel_http]") {
+TEST_CASE("the drawing has positions, and four viewers can watch", "[panel_http]") {
   const Stage stage;
   const auto network = nlohmann::json::parse(Stage::body(stage.ask(stage.get("/network"))));
   CHECK(network["dots"] == 2);
@@ -353,7 +353,7 @@ TEST_CASE("the addresses of OSC are a tree that OSCQuery programs read", "[panel
   CHECK_FALSE(read("/?HOST_INFO").contains("OSC_PORT"));  // this one is not heard by UDP
 }
 
-TEST_CASE("beyond this machine nobody gets in without the token", "[panel_http]") {
+TEST_CASE("remote clients need the token", "[panel_http]") {
   const Stage stage({.bind_address = "0.0.0.0"});
   CHECK(stage.panel->is_for_all());
   CHECK(stage.status(stage.get("/")) == 403);
@@ -369,7 +369,7 @@ TEST_CASE("beyond this machine nobody gets in without the token", "[panel_http]"
                      std::to_string(stage.port) + "\r\n\r\n") == 403);
 }
 
-TEST_CASE("a port that is taken is an error, and streams end when the panel does", "[panel_http]") {
+TEST_CASE("a port in use is an error, and streams end with the panel", "[panel_http]") {
   auto stage = std::make_unique<Stage>();
   const auto second = WebPanel::open({.port = stage->port}, stage->process, stage->session,
                                      stage->motion, *stage->osc);
@@ -387,7 +387,7 @@ TEST_CASE("a port that is taken is an error, and streams end when the panel does
   close(idler);
 }
 
-TEST_CASE("the page is small, whole and asks nobody else", "[panel_http]") {
+TEST_CASE("the page is small, complete and loads nothing external", "[panel_http]") {
   std::size_t bytes = 0;
   std::set<std::string_view> paths;
   for (const PageFile& file : page_files()) {

@@ -75,7 +75,7 @@ std::vector<Scene> scenes_with_taps() {
            {"bell:rim", "bell:crown", "bell:0.25"}}};
 }
 
-TEST_CASE("what is drawn is where the render hears it, whatever computes it", "[panel]") {
+TEST_CASE("the drawing matches the render for every kernel", "[panel]") {
   std::set<Method> seen;
   for (const Scene& scene : scenes_with_taps()) {
     const Network network = network_of(scene.text);
@@ -113,7 +113,7 @@ TEST_CASE("what is drawn is where the render hears it, whatever computes it", "[
   CHECK(seen.size() >= 4);
 }
 
-TEST_CASE("of a large network so many masses are drawn as there is room for", "[panel]") {
+TEST_CASE("a large network is drawn in part", "[panel]") {
   const std::string text = "@s string 5000 1. 0.1 0.0001 0 0\n" +
                            std::string("@in1 frcInput [@s 0.3]\n@out1 posOutput [@s 0.3]\n");
   Player player(text, struck(1), {.method = Method::direct});
@@ -130,7 +130,7 @@ TEST_CASE("of a large network so many masses are drawn as there is room for", "[
 // A blow as soft as half a period of 80 Hz, on a string whose waves nothing damps: what is drawn
 // between its places is where places would be that hold nothing. A sample to either side is what a
 // place's own rounding is worth, and a straight line has a thirty-second of the string.
-TEST_CASE("a waveguide is drawn where places between its places are heard", "[panel]") {
+TEST_CASE("a waveguide's drawing matches its displacement", "[panel]") {
   for (const std::string kind : {"waveguide", "openWaveguide"}) {
     const std::string text = "@s " + kind + " 1. 55. 1000. 1. 0.1\n@out1 posOutput [@s 0.23]\n" +
                              "@out2 posOutput [@s 0.81]\n";
@@ -197,7 +197,7 @@ TEST_CASE("a waveguide is drawn where places between its places are heard", "[pa
   }
 }
 
-TEST_CASE("a look changes no bit of the sound and takes no memory", "[panel]") {
+TEST_CASE("viewing changes no bit of the sound and allocates nothing", "[panel]") {
   const std::string waveguides =
       "@s waveguide 1. 220. 3. 0.4 0.\n@t openWaveguide 0.5 110. 3. 0.6 0.\n"
       "@b springDamper [@s 0.9] [@t 0.3] 0.2 0.01\n@in1 frcInput [@s 0.2]\n"
@@ -252,7 +252,7 @@ TEST_CASE("a look changes no bit of the sound and takes no memory", "[panel]") {
   }
 }
 
-TEST_CASE("slow motion is a stroboscope at the pitch that sounds", "[panel]") {
+TEST_CASE("slow motion is stroboscopic at the sounding pitch", "[panel]") {
   for (const int key : {45, 57, 69, 76}) {
     Harness harness(false, 1);
     const std::string text = ringing_string();

@@ -21,7 +21,7 @@ double volume_of(const SolidMesh& solid) {
   return six / 6.0;
 }
 
-TEST_CASE("boxes and balls are filled and closed", "[solid_mesh]") {
+TEST_CASE("meshes of boxes and balls are complete and closed", "[solid_mesh]") {
   const auto box = quadratic(box_mesh({3.0, 2.0, 1.0}, {3, 2, 2}));
   REQUIRE(box);
   CHECK(box->points.size() == 7 * 5 * 5);  // twice as many along each side, less one
@@ -45,7 +45,7 @@ TEST_CASE("boxes and balls are filled and closed", "[solid_mesh]") {
   }
 }
 
-TEST_CASE("a box is known however it lies, and nothing else is", "[solid_mesh]") {
+TEST_CASE("a box is recognised in any orientation, and nothing else is", "[solid_mesh]") {
   Random random(5);
   for (int round = 0; round < 20; ++round) {
     Surface box = box_surface({random.uniform(0.1, 2.0), random.uniform(0.1, 2.0), 1.0});
@@ -97,7 +97,7 @@ TEST_CASE("a box is known however it lies, and nothing else is", "[solid_mesh]")
   CHECK_FALSE(as_box(*closed));
 }
 
-TEST_CASE("a ball is known wherever it lies, and nothing else is", "[solid_mesh]") {
+TEST_CASE("a ball is recognised anywhere, and nothing else is", "[solid_mesh]") {
   Surface ball = icosphere(2, 0.7, false);
   for (Point3& point : ball.points) {
     point = point + Point3{10.0, -3.0, 2.0};
@@ -127,7 +127,7 @@ TEST_CASE("a ball is known wherever it lies, and nothing else is", "[solid_mesh]
   }
 }
 
-TEST_CASE("flat, missing and no tetrahedra are told", "[solid_mesh]") {
+TEST_CASE("flat, missing and absent tetrahedra are reported", "[solid_mesh]") {
   CHECK_FALSE(quadratic({}));
   CHECK_FALSE(quadratic({{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}}, {{0, 1, 2, 3}}}));
   CHECK_FALSE(quadratic({{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2, 3}}}));
@@ -139,7 +139,7 @@ TEST_CASE("flat, missing and no tetrahedra are told", "[solid_mesh]") {
   CHECK(volume_of(*turned) == Approx(1.0 / 6.0).epsilon(1e-12));
 }
 
-TEST_CASE("what meshing programs write is read, and what they do not is told", "[solid_mesh]") {
+TEST_CASE("files of meshing programs are read, and faulty ones reported", "[solid_mesh]") {
   const std::string gmsh =
       "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n7 0 1 0\n4 0 0 1\n"
       "$EndNodes\n$Elements\n3\n1 15 2 0 1 1\n2 2 2 0 1 1 2 7\n3 4 2 0 1 1 2 7 4\n$EndElements\n";

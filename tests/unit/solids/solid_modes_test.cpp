@@ -129,7 +129,7 @@ std::vector<double> ritz_box(const Point3& sides, const SolidMaterial& material,
   return frequencies;
 }
 
-TEST_CASE("a steel bar swings as Ritz's method has it", "[solid_modes]") {
+TEST_CASE("a steel bar has the frequencies of Ritz's method", "[solid_modes]") {
   // ME-T1, T-BAR: converged values of a 3-D Ritz computation of degree 20.
   const SolidModes modes =
       modes_of(box_mesh({0.2, 0.02, 0.01}, {40, 4, 2}), {"", 2e11, 0.3, 7850.0}, 12);
@@ -142,7 +142,7 @@ TEST_CASE("a steel bar swings as Ritz's method has it", "[solid_modes]") {
   CHECK(nearest(modes, 5800.8) == Approx(5800.8).epsilon(1e-2));  // torsion
 }
 
-TEST_CASE("a cube swings in twos and threes", "[solid_modes]") {
+TEST_CASE("a cube has double and triple modes", "[solid_modes]") {
   // ME-T2: Omega = omega L sqrt(rho / E), Demarest's problem at nu = 0.3.
   const SolidModes modes = modes_of(box_mesh({1.0, 1.0, 1.0}, {8, 8, 8}), {"", 1.0, 0.3, 1.0}, 14);
   CHECK(modes.rigid == 6);
@@ -155,7 +155,7 @@ TEST_CASE("a cube swings in twos and threes", "[solid_modes]") {
   CHECK(2.0 * pi * modes.frequency_hz[8] == Approx(pi * std::sqrt(2.0 / 2.6)).epsilon(1e-3));
 }
 
-TEST_CASE("a ball swings as Lamb found", "[solid_modes]") {
+TEST_CASE("a ball has Lamb's frequencies", "[solid_modes]") {
   // eta = omega R sqrt(rho / G) at nu = 0.3; our own ball, drawn to the volume of a round one.
   TetrahedronMesh ball = ball_mesh(1.0, 4);
   const SolidMesh solid = meshed(ball);
@@ -180,7 +180,7 @@ TEST_CASE("a ball swings as Lamb found", "[solid_modes]") {
   }
 }
 
-TEST_CASE("boxes of any size and matter swing as Ritz's method has it", "[solid_modes]") {
+TEST_CASE("boxes of any size and material have the frequencies of Ritz's method", "[solid_modes]") {
   // ME-T4
   Random random(20261122);
   for (int round = 0; round < 3; ++round) {
@@ -199,7 +199,7 @@ TEST_CASE("boxes of any size and matter swing as Ritz's method has it", "[solid_
   }
 }
 
-TEST_CASE("a tapered membrane held at its root swings as NAFEMS has it", "[solid_modes]") {
+TEST_CASE("a tapered membrane has the frequencies of the NAFEMS benchmark", "[solid_modes]") {
   // ME-T5, FV32: 10 m long, 5 m high at the root and 1 m at the tip; in its plane alone, which a
   // stiff spring at every node of the middle plane sees to here.
   TetrahedronMesh mesh = box_mesh({10.0, 1.0, 0.05}, {32, 16, 2});
@@ -228,7 +228,7 @@ TEST_CASE("a tapered membrane held at its root swings as NAFEMS has it", "[solid
   }
 }
 
-TEST_CASE("a clamped bar swings as a cantilever", "[solid_modes]") {
+TEST_CASE("a clamped bar has the frequencies of a cantilever", "[solid_modes]") {
   // f = (beta L)^2 / 2 pi sqrt(E I / rho A) / L^2 with beta L = 1.87510, 4.69409 (Euler-Bernoulli).
   // At L / h = 100 shear takes less than 0.1 %, and what the clamp hinders adds about as much.
   const double l = 1.0;
@@ -271,7 +271,7 @@ TEST_CASE("size, stiffness and density scale frequencies exactly", "[solid_modes
   }
 }
 
-TEST_CASE("a bar's ends, middle and nodes move as a beam's", "[solid_modes]") {
+TEST_CASE("a bar's ends, middle and nodes move like a beam's", "[solid_modes]") {
   // ME-T8, Euler-Bernoulli, free: phi_end^2 m = 4, phi_mid / phi_end = -0.6079, a node at 0.2242 L.
   const SolidMaterial steel{"", 2e11, 0.3, 7850.0};
   const TetrahedronMesh mesh = box_mesh({1.0, 0.012, 0.008}, {125, 1, 1});
@@ -287,7 +287,7 @@ TEST_CASE("a bar's ends, middle and nodes move as a beam's", "[solid_modes]") {
   CHECK(std::abs(weight(0.224) / weight(0.0)) < 0.01);  // 40 dB
 }
 
-TEST_CASE("all modes of a small solid are those of its dense matrices", "[solid_modes]") {
+TEST_CASE("all modes of a small solid equal those of its dense matrices", "[solid_modes]") {
   TetrahedronMesh mesh = box_mesh({1.0, 0.7, 0.5}, {1, 1, 1});
   for (Point3& point : mesh.points) {
     point[0] += 0.2 * point[1] * point[2];
@@ -362,7 +362,7 @@ TEST_CASE("refining lowers every frequency", "[solid_modes]") {
   }
 }
 
-TEST_CASE("decays are as their formulas have them", "[solid_modes]") {
+TEST_CASE("decays follow their formulas", "[solid_modes]") {
   // T-DAMP: a = 5, b = 3e-8; 13.8155 / (a + b omega^2).
   const SolidDamping rayleigh{5.0, 3e-8, 0.0};
   CHECK(rayleigh.t60_s(200.0) == Approx(2.737).epsilon(5e-4));
@@ -373,7 +373,7 @@ TEST_CASE("decays are as their formulas have them", "[solid_modes]") {
         Approx(std::log(1000.0) / (pi * 2e-4 * 440.0)).epsilon(1e-12));
 }
 
-TEST_CASE("what is clamped all over and what is asked for too much are told", "[solid_modes]") {
+TEST_CASE("fully clamped solids and excessive requests are reported", "[solid_modes]") {
   const SolidMesh solid = meshed(box_mesh({1.0, 1.0, 1.0}, {1, 1, 1}));
   const SolidMaterial steel{"", 2e11, 0.3, 7850.0};
   const auto held =

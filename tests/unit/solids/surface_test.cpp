@@ -33,7 +33,7 @@ TEST_CASE("a solid is the same from ASCII, binary and OBJ", "[surface]") {
   }
 }
 
-TEST_CASE("faces of OBJ with many corners and numbers from behind are read", "[surface]") {
+TEST_CASE("OBJ faces with many corners and negative indices are read", "[surface]") {
   const auto cube = read_obj(
       "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n"
       "usemtl steel\nvn 0 0 1\nf 4 3 2 1\nf -4 -3 -2 -1\r\n"
@@ -45,7 +45,7 @@ TEST_CASE("faces of OBJ with many corners and numbers from behind are read", "[s
   CHECK(solid->volume == Approx(1.0).epsilon(1e-12));
 }
 
-TEST_CASE("what cannot be read is told with its line", "[surface]") {
+TEST_CASE("unreadable files are reported with the line", "[surface]") {
   struct Case {
     std::string text;
     int line;
@@ -111,7 +111,7 @@ TEST_CASE("an open surface names its edges", "[surface]") {
   CHECK(many.error().message.find(" more") != std::string::npos);
 }
 
-TEST_CASE("triangles are turned outwards, and points that are one are welded", "[surface]") {
+TEST_CASE("triangles are oriented outwards, and coincident points are welded", "[surface]") {
   Surface box = box_surface({1.0, 2.0, 3.0});
   Random random(3);
   std::size_t turned = 0;
@@ -144,7 +144,7 @@ TEST_CASE("triangles are turned outwards, and points that are one are welded", "
   CHECK(thinned->left_out == 1);
 }
 
-TEST_CASE("hollows look inwards, and two bodies are refused", "[surface]") {
+TEST_CASE("cavities face inwards, and two bodies are rejected", "[surface]") {
   Surface shell = icosphere(2, 1.0, true);
   append(shell, icosphere(2, 0.5, true));  // both outwards, the inner one last
   const auto hollow = closed(shell);
@@ -173,7 +173,7 @@ TEST_CASE("hollows look inwards, and two bodies are refused", "[surface]") {
   CHECK(rattle.error().message.find("more than one body") != std::string::npos);
 }
 
-TEST_CASE("a surface with one side and one without an inside are refused", "[surface]") {
+TEST_CASE("one-sided surfaces and surfaces without volume are rejected", "[surface]") {
   // A projective plane: the six points of half an icosahedron, every two joined. Every edge has two
   // triangles, and no way of turning them fits.
   Surface plane;
@@ -191,7 +191,7 @@ TEST_CASE("a surface with one side and one without an inside are refused", "[sur
   REQUIRE_FALSE(nothing);
 }
 
-TEST_CASE("no bytes break the readers", "[surface]") {
+TEST_CASE("random bytes do not crash the readers", "[surface]") {
   const Surface ball = icosphere(1, 1.0, false);
   const std::vector<std::string> seeds = {ascii_stl(ball), binary_stl(ball), obj(ball)};
   Random random(20261122);
