@@ -260,10 +260,12 @@ Accuracy Judge::at(std::size_t corner, const Stepping& stepping) {
     return worst;
   };
   const Corner& numbers = corners_[corner];
-  if (!program.modes.empty()) {
-    return of_bodies(corner, stepping);
+  // The modes of bodies are exact in the published scheme; the springs between bodies are not.
+  const bool has_bodies = !program.modes.empty();
+  if (has_bodies && !has_linear_springs(program)) {
+    return {};
   }
-  if (program.moving > most_masses_ && program.moving > most_coupled_masses) {
+  if (!has_bodies && program.moving > std::max(most_masses_, most_coupled_masses)) {
     // Rayleigh damping needs no modes: scan all stiffnesses up to the edge bound (Gershgorin).
     const auto proportion = rayleigh_of(program, numbers.parameters, numbers.stiffness_factor);
     if (!proportion) {
@@ -284,7 +286,7 @@ Accuracy Judge::at(std::size_t corner, const Stepping& stepping) {
   if (!continuous.is_known) {
     return unknown();
   }
-  if (continuous.is_proportional) {
+  if (continuous.is_proportional && !has_bodies) {
     return compare_modes(continuous.modes);
   }
   const Poles wanted = continuous.all_poles();
@@ -293,30 +295,13 @@ Accuracy Judge::at(std::size_t corner, const Stepping& stepping) {
   }
   Poles expected;
   for (const Complex& pole : wanted) {
-    expected.push_back(stepping.pole(std::norm(pole), -2.0 * pole.real()).value_or(pole));
+    expected.push_back(
+        has_bodies ? pole : stepping.pole(std::norm(pole), -2.0 * pole.real()).value_or(pole));
   }
   progress_.spend(std::size_t{8} * program.moving * program.moving * program.moving);
-  return compare(wanted, expected,
-                 stepping.poles(springs_of(program, numbers.parameters, numbers.stiffness_factor)),
-                 rate_hz);
-}
-
-// The modes of bodies are exact in the published scheme; the springs between bodies are not.
-Accuracy Judge::of_bodies(std::size_t corner, const Stepping& stepping) {
-  if (!has_linear_springs(program_)) {
-    return {};
-  }
-  const Continuous& continuous = continuous_at(corner);
-  const Corner& numbers = corners_[corner];
-  if (!continuous.is_known || program_.moving > most_coupled_masses) {
-    return unknown();
-  }
-  const Poles wanted = continuous.all_poles();
-  progress_.spend(std::size_t{8} * program_.moving * program_.moving * program_.moving);
-  return compare(
-      wanted, wanted,
-      stepping.poles(springs_of(program_, numbers.parameters, numbers.stiffness_factor, true)),
-      program_.rate_hz);
+  const Springs springs =
+      springs_of(program, numbers.parameters, numbers.stiffness_factor, has_bodies);
+  return compare(wanted, expected, stepping.poles(springs), rate_hz);
 }
 
 }  // namespace ressort::compile

@@ -81,7 +81,6 @@ class Judge {
     std::vector<std::complex<double>> all_poles() const;
   };
   const Continuous& continuous_at(std::size_t corner);
-  Accuracy of_bodies(std::size_t corner, const Stepping& stepping);
   Accuracy at(std::size_t corner, const Stepping& stepping);
 
   const Program& program_;
