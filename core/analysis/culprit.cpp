@@ -248,15 +248,15 @@ Error complaint(const Certificate& certificate) {
     text += is_mass ? " must stay above " : " must stay below ";
     text += print_limit(*culprit.limit, !is_mass);
   } else if (certificate.factor > 0.0) {
-    text += is_mass ? " is too little" : " is too much";
-    text += ", but not by itself: all stiffness and damping must come down to " +
-            print_limit(certificate.factor, true) + " of what they are";
+    text += is_mass ? " is too small" : " is too large";
+    text += ", but no value of it alone is enough: reduce all stiffness and damping to " +
+            print_limit(certificate.factor, true) + " of their values";
   } else if (!std::isfinite(culprit.value)) {
-    text += " is no number";
+    text += " is not finite";
   } else if (is_mass || culprit.value < 0.0) {
-    text += is_mass ? " must be above 0" : " is negative, and motion may grow by itself";
+    text += is_mass ? " must be above 0" : " is negative, so motion can grow without end";
   } else {
-    text += " is too large to be reckoned with";
+    text += " is too large for the analysis";
   }
   return {std::move(text), culprit.location.line, culprit.location.column};
 }

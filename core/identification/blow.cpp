@@ -112,14 +112,14 @@ Clipped find_clipped(const Recording& recording, double peak) {
 Result<Blow> find_blow(const Recording& recording) {
   const std::vector<std::vector<double>>& channels = recording.channels;
   if (channels.empty() || channels[0].empty()) {
-    return Error{"there are no samples in it"};
+    return Error{"the recording has no samples"};
   }
   if (channels.size() > most_channels) {
     return Error{"it has " + std::to_string(channels.size()) + " channels; at most " +
-                 std::to_string(most_channels) + " are looked at"};
+                 std::to_string(most_channels) + " are supported"};
   }
   if (!(recording.rate_hz >= lowest_rate_hz)) {
-    return Error{"its sample rate is below 4000 Hz"};
+    return Error{"its sample rate is below 4000 Hz; record at a higher rate"};
   }
   const std::size_t frames = channels[0].size();
   std::vector<double> means;
@@ -128,8 +128,8 @@ Result<Blow> find_blow(const Recording& recording) {
     double sum = 0.0;
     for (std::size_t n = 0; n < frames; ++n) {
       if (!std::isfinite(channels[c][n])) {
-        return Error{"what stands at " + seconds(static_cast<double>(n) / recording.rate_hz) +
-                     " in channel " + std::to_string(c + 1) + " is no number"};
+        return Error{"the sample at " + seconds(static_cast<double>(n) / recording.rate_hz) +
+                     " in channel " + std::to_string(c + 1) + " is not finite"};
       }
       sum += channels[c][n];
       largest = std::max(largest, std::fabs(channels[c][n]));

@@ -481,13 +481,12 @@ void warn_of_recording(const Blow& blow, Identification& found) {
         (blow.skipped > 0
              ? "the first " +
                    number("%.3g", 1e3 * static_cast<double>(blow.skipped) / found.rate_hz) +
-                   " ms are concluded from what follows"
-             : "modes that are none, and amplitudes that are too small, may come of "
-               "that"));
+                   " ms are extrapolated from the sound that follows"
+             : "some modes may be spurious and some amplitudes too small"));
   }
   if (blow.offset > 0.01) {
     found.warnings.push_back("it has an offset (DC) of " + number("%.0f", 100.0 * blow.offset) +
-                             " % of its peak, which is left out");
+                             " % of its peak, which is removed");
   }
   if (blow.length_s > longest_ring_s + 0.001 && rings_s > longest_ring_s - 0.001) {
     found.warnings.push_back("only the first " + number("%.0f", longest_ring_s) +
@@ -563,11 +562,11 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
   if (steady > 0) {
     made.warnings.push_back(
         (steady == 1 ? "a tone" : std::to_string(steady) + " tones") +
-        std::string(" that cannot be seen to decay ") + (steady == 1 ? "is" : "are") +
-        " left out, " + (steady == 1 ? "" : "the loudest ") + "at " + number("%.1f Hz", steady_hz));
+        std::string(" without a measurable decay ") + (steady == 1 ? "is" : "are") + " left out, " +
+        (steady == 1 ? "" : "the loudest ") + "at " + number("%.1f Hz", steady_hz));
   }
   if (kept.empty()) {
-    return Error{"nothing in it rings: no decaying tone rises out of its noise"};
+    return Error{"nothing in it rings: no decaying tone stands above its noise"};
   }
   std::sort(kept.begin(), kept.end(), [](const Found& a, const Found& b) {
     return a.mode.log_z.imag() < b.mode.log_z.imag();
@@ -596,7 +595,7 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
     made.warnings.push_back(
         "the modes explain only " +
         number("%.0f", 100.0 * (1.0 - std::pow(10.0, made.residual_db / 10.0))) +
-        " % of its energy: this is not the ringing of one blow");
+        " % of its energy; the recording does not sound like the ringing of one blow");
   }
   return made;
 } catch (const Stopped&) {

@@ -211,7 +211,7 @@ Result<TetrahedronMesh> read_gmsh(std::string_view text) {
       const auto corner = numbers.count(most_rows);
       const auto place = corner ? numbering.find(*corner) : std::nullopt;
       if (!place) {
-        return numbers.error("the number of a point that is there");
+        return numbers.error("the number of an existing point");
       }
       tetrahedron[k] = *place;
     }
@@ -231,7 +231,7 @@ Result<TetrahedronMesh> read_tetgen(std::string_view nodes, std::string_view ele
   const auto attributes = numbers.count(100);
   const auto marks = numbers.count(1);
   if (!points || !dimension || *dimension != 3 || !attributes || !marks) {
-    return numbers.error("the number of points, 3, and how many numbers more they have");
+    return numbers.error("the number of points, 3, and the number of attributes");
   }
   for (std::size_t i = 0; i < *points; ++i) {
     const auto number = numbers.count(most_rows);
@@ -252,7 +252,7 @@ Result<TetrahedronMesh> read_tetgen(std::string_view nodes, std::string_view ele
   const auto corners = rows.count(10);
   const auto regions = rows.count(100);
   if (!count || !corners || *corners != 4 || !regions) {
-    return rows.error("the number of tetrahedra, 4, and how many numbers more they have");
+    return rows.error("the number of tetrahedra, 4, and the number of attributes");
   }
   for (std::size_t i = 0; i < *count; ++i) {
     const auto number = rows.count(most_rows);

@@ -176,7 +176,7 @@ Result<Surface> read_ascii_stl(std::string_view text) {
     push(surface, corners);
   }
   if (surface.triangles.empty()) {
-    return Error{"there is no 'facet' in it", words.line()};
+    return Error{"it has no 'facet'", words.line()};
   }
   return surface;
 }
@@ -285,7 +285,7 @@ Result<Surface> read_obj(std::string_view text) {
     }
   }
   if (surface.triangles.empty()) {
-    return Error{"there is no face in it: a line 'f' and the numbers of its points", words.line()};
+    return Error{"it has no face (a line with 'f' and the numbers of its points)", words.line()};
   }
   return surface;
 }

@@ -28,7 +28,7 @@ Result<SolidMesh> quadratic(const TetrahedronMesh& mesh) {
   for (Tetrahedron t : mesh.tetrahedra) {
     for (const int corner : t) {
       if (corner < 0 || at(corner) >= mesh.points.size()) {
-        return Error{"a tetrahedron has a corner that is not there"};
+        return Error{"a tetrahedron refers to a missing point"};
       }
     }
     double longest = 0.0;
@@ -53,7 +53,7 @@ Result<SolidMesh> quadratic(const TetrahedronMesh& mesh) {
     corners.push_back(t);
   }
   if (corners.empty()) {
-    return Error{"there is no tetrahedron in it"};
+    return Error{"the mesh has no tetrahedron"};
   }
   struct Middle {
     int low;

@@ -259,18 +259,17 @@ Result<Eigenpairs> lowest_solid_pairs(const SolidMesh& mesh, const SolidMatrices
                                       double shift, int count, const Progress& progress) {
   const int rows = matrices.mass.size();
   if (rows == 0) {
-    return Error{"all of its nodes are clamped"};
+    return Error{"all of its nodes are clamped; make the clamps smaller"};
   }
   std::vector<Point3> places;
   for (const int node : matrices.node) {
     places.push_back(mesh.points[at(node)]);
   }
-  progress.stage("finding an order for its equations");
+  progress.stage("ordering its equations");
   FrontalCholesky factor(matrices.mass, places, progress);
   if (factor.size() > most_factor_elements) {
-    return Error{std::to_string(3 * rows) + " unknowns are too many to be solved for: " +
-                 std::to_string(std::lround(factor.size() * 8e-9)) +
-                 " GB; a coarser mesh has fewer"};
+    return Error{std::to_string(3 * rows) + " unknowns are too many: the solution needs " +
+                 std::to_string(std::lround(factor.size() * 8e-9)) + " GB; use a coarser mesh"};
   }
   progress.stage("factoring its stiffness");
   std::vector<NodeBlock> shifted = matrices.stiffness;
@@ -289,7 +288,7 @@ Result<Eigenpairs> lowest_solid_pairs(const SolidMesh& mesh, const SolidMatrices
       shift, std::min(count, 3 * rows), 3 * rows, [&](Matrix& x) { factor.solve(x); },
       [&](Matrix& x) { times_mass(matrices.mass, x); }, progress);
   if (!pairs) {
-    return Error{"its modes could not be found: the iteration does not converge"};
+    return Error{"its modes were not found: the iteration does not converge"};
   }
   return *std::move(pairs);
 }
@@ -297,7 +296,7 @@ Result<Eigenpairs> lowest_solid_pairs(const SolidMesh& mesh, const SolidMatrices
 Result<SolidModes> find_solid_modes(const SolidMesh& mesh, const SolidMaterial& material,
                                     std::span<const SolidClamp> clamps, int count,
                                     const Progress& progress) {
-  progress.stage("putting its elements together");
+  progress.stage("assembling its elements");
   const SolidMatrices matrices = solid_matrices(mesh, material, clamps, progress);
   const double shift = shift_of(mesh, material);
   const bool is_free = matrices.node.size() == mesh.points.size();

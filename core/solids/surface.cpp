@@ -197,7 +197,7 @@ Result<Done> sort_shells(ClosedSurface& closed, const Progress& progress) {
   constexpr int most_shells = 64;
   if (closed.shells > most_shells) {
     return Error{"its surface has " + std::to_string(closed.shells) +
-                 " separate parts; a body is one"};
+                 " separate parts; a body must be one part"};
   }
   std::vector<double> volume(at(closed.shells), 0.0);
   std::vector<Point3> corner(at(closed.shells));
@@ -231,9 +231,9 @@ Result<Done> sort_shells(ClosedSurface& closed, const Progress& progress) {
       }
     }
     if (around != 1) {
-      return Error{"it is more than one body: a part with a corner at " +
+      return Error{"it has more than one part: the part with a corner at " +
                    to_string(corner[at(shell)]) +
-                   " m does not hang together with the rest; a body is in one piece"};
+                   " m is not connected to the rest; a body must be one part"};
     }
   }
   for (int shell = 0; shell < closed.shells; ++shell) {
@@ -292,7 +292,7 @@ Surface scaled(Surface surface, double metres_per_unit) {
 Result<ClosedSurface> close_surface(const Surface& surface, const Progress& progress) {
   const double size = box_around(surface.points).diagonal();
   if (!(size > 0.0)) {
-    return Error{"all of its points are one"};
+    return Error{"all of its points coincide"};
   }
   const std::vector<int> same = weld(surface.points, weld_share * size);
   progress.spend(64 * surface.points.size());
@@ -325,7 +325,7 @@ Result<ClosedSurface> close_surface(const Surface& surface, const Progress& prog
   }
   const std::vector<Triangle> given = closed.surface.triangles;
   if (!turn_alike(closed.surface.triangles, edges, closed)) {
-    return Error{"the surface has one side only, like a Moebius strip: nothing is inside of it"};
+    return Error{"the surface is one-sided (like a Möbius strip), so it encloses no volume"};
   }
   if (auto sorted = sort_shells(closed, progress); !sorted) {
     return sorted.error();
@@ -338,7 +338,7 @@ Result<ClosedSurface> close_surface(const Surface& surface, const Progress& prog
       box_around(closed.surface.points).high - box_around(closed.surface.points).low;
   if (!(closed.volume > 1e-9 * size * size * size) ||
       *std::min_element(sides.begin(), sides.end()) <= 0.0) {
-    return Error{"the surface holds nothing in: its volume is " + std::to_string(closed.volume) +
+    return Error{"the surface encloses no volume: its volume is " + std::to_string(closed.volume) +
                  " m^3"};
   }
   return closed;

@@ -61,7 +61,8 @@ class LowestSwings {
   Result<Swings> find(std::size_t count) {
     progress_.stage("factoring its springs");
     if (!factor_.analyze(stiffness_, progress_)) {
-      return Error{"its masses hang together in so many ways that its modes would take too long"};
+      return Error{
+          "its masses are connected in too many ways: finding its modes would take too long"};
     }
     if (!factored(factor_, shift_)) {
       return Error{"the springs cannot be factored: is a stiffness below 0?"};
@@ -197,7 +198,7 @@ class LowestSwings {
   // small enough.
   Result<Swings> add_damping(std::size_t count) {
     for (int round = 0;; ++round) {
-      progress_.stage("finding what dampers do to the modes");
+      progress_.stage("computing the damped modes");
       auto swings = swings_of(between(stiffness_), between(damping_), e_, rigid_);
       if (!swings) {
         return Error{"the modes were not found: the iteration does not converge"};

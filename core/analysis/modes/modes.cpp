@@ -146,7 +146,7 @@ Result<NetworkModes> find_modes(const Network& network, std::span<const double> 
   made.scheme = options.scheme;
   made.rate_hz = options.rate_hz;
   if (!made.system.is_sound) {
-    return Error{"a mass is not above 0, or a stiffness or damping is no finite number"};
+    return Error{"a mass is not above 0, or a stiffness or damping is not finite"};
   }
   auto found = find_swings(made.system, options);
   if (!found) {

@@ -136,7 +136,7 @@ Result<std::vector<SpringLine>> spring_lines(const Network& network, std::string
     const Macro& macro = network.macros[i];
     if (is_in(parts.of_macro(i)) && (macro.kind == MacroKind::body || is_waveguide(macro.kind))) {
       return Error{
-          "'" + macro.name + "' has the frequencies that its own lines say: tune them there",
+          "'" + macro.name + "' gets its frequencies from its own lines; change them there",
           macro.location.line, macro.location.column};
     }
     if (is_in(parts.of_macro(i))) {

@@ -45,7 +45,7 @@ class ModeTuner {
         make_linear_system(expanded, scheme_step(options), options.scheme == ModeScheme::published);
     of_ = lines_of(network, expanded, system_, lines_);
     if (!system_.is_sound) {
-      failure_ = Error{"a mass is not above 0, or a stiffness or damping is no finite number"};
+      failure_ = Error{"a mass is not above 0, or a stiffness or damping is not finite"};
     }
     stiffness.assign(lines_.size(), 1.0);
     damping.assign(lines_.size(), 1.0);
@@ -154,7 +154,7 @@ Result<Tuned> tune_mode(const Network& network, std::span<const double> paramete
                  std::to_string(tuner.swings.size())};
   }
   Swing swing = tuner.swings[target.mode];
-  const std::string what = "mode " + std::to_string(target.mode + 1) + " cannot be brought to ";
+  const std::string what = "mode " + std::to_string(target.mode + 1) + " cannot be tuned to ";
   double k = 0.0;  // Logarithms of the factors.
   double z = 0.0;
   for (int step = 0; step < most_steps; ++step) {
@@ -183,7 +183,7 @@ Result<Tuned> tune_mode(const Network& network, std::span<const double> paramete
     if (target.t60_s) {
       const double area = by_k.imag() * by_z.real() - by_k.real() * by_z.imag();
       if (std::fabs(by_z.real()) <= 1e-9 * std::fabs(tuner.growth(*target.t60_s))) {
-        return Error{what + "a decay of its own: nothing of " +
+        return Error{what + "a new decay: no damper of " +
                      (target.part.empty() ? "the model" : "'" + target.part + "'") + " damps it"};
       }
       step_k = (high * by_z.real() - loud * by_z.imag()) / area;
@@ -224,15 +224,15 @@ Result<Network> tune_modes(const Network& network, std::span<const double> param
                     [&](const Link& link) { return is_place(link.a) || is_place(link.b); })) {
       return Error{"the model has " + std::to_string(lines->size()) + " lines of springs for " +
                    std::to_string(count) +
-                   " frequencies, and its strings and meshes cannot be written out mass by mass, "
-                   "as links hold them between their masses"};
+                   " frequencies, and its strings and meshes cannot be expanded into masses, "
+                   "because links are attached between their masses"};
     }
     return tune_modes(canonical(expand_macros(network)), parameters, frequencies_hz, options);
   }
   if (!std::is_sorted(frequencies_hz.begin(), frequencies_hz.end()) ||
       std::any_of(frequencies_hz.begin(), frequencies_hz.end(),
                   [](double hz) { return !(hz > 0.0); })) {
-    return Error{"expected frequencies above 0 Hz, the lowest first"};
+    return Error{"expected frequencies above 0 Hz in ascending order"};
   }
   ModeTuner tuner(network, parameters, "", options);
   if (tuner.failure()) {
@@ -324,7 +324,7 @@ Result<Network> tune_modes(const Network& network, std::span<const double> param
     }
     distance = std::move(better);
   }
-  return Error{"the springs do not lead there; the nearest that was found is up to " +
+  return Error{"no springs give these frequencies; the nearest solution found is up to " +
                std::to_string(1200.0 / std::numbers::ln2 * largest(*distance)) + " cents off"};
 }
 

@@ -112,7 +112,7 @@ class Asker {
       const double noticed = value ? noticed_between(target.figure, *value, target.value)
                                    : std::numeric_limits<double>::quiet_NaN();
       if (!std::isfinite(noticed)) {
-        error = Error{"it has no " + std::string(row_of(target.figure).name) + " there"};
+        error = Error{"the sound has no " + std::string(row_of(target.figure).name) + " there"};
         return std::nullopt;
       }
       trial.noticed.push_back(noticed);
@@ -444,7 +444,7 @@ Result<AskedTimbre> ask_timbre(const AskedModel& model, std::span<const double> 
                                std::span<const FreeParameter> free,
                                std::span<const TimbreTarget> targets, const AskOptions& options) {
   if (free.empty()) {
-    return Error{"no parameter may be turned"};
+    return Error{"no parameter is free to change"};
   }
   if (targets.empty()) {
     return Error{"nothing is asked for"};

@@ -111,7 +111,7 @@ std::string_view wrong_with(AskedFigure figure, double value) {
   return is_right        ? ""
          : row.is_signed ? "must be a number"
          : row.is_ratio  ? "must be a number above 0"
-                         : "must be a number from 0 on";
+                         : "must be a number of at least 0";
 }
 
 double noticed_between(AskedFigure figure, double value, double target) {
@@ -195,7 +195,7 @@ Result<StruckModel::Tuned> StruckModel::tuned(std::span<const double> parameters
     }
     if (options_.pitch_mode >= modes->size()) {
       return Error{"there is no mode " + std::to_string(options_.pitch_mode + 1) +
-                   " that swings, so no key has a pitch"};
+                   " that oscillates, so keys cannot set the pitch"};
     }
     const ModeTone tone = (*modes)[options_.pitch_mode].tone;
     if (std::fabs(tone.frequency_hz / *options_.key_hz - 1.0) < in_tune) {
@@ -209,7 +209,7 @@ Result<StruckModel::Tuned> StruckModel::tuned(std::span<const double> parameters
     }
   }
   factor_ = 1.0;
-  return Error{"the key has no pitch: stiffness alone does not bring the mode there"};
+  return Error{"the key has no pitch: stiffness alone cannot move the mode to its frequency"};
 }
 
 FrameTimbre StruckModel::lines_of(std::span<const DecayingPartial> partials, double f0_hz) const {
@@ -351,14 +351,14 @@ Result<AskedValues> StruckModel::figures_of(const Tuned& tuned, StruckAs how) co
       return Error{"a mode at " + std::to_string(mode.tone.frequency_hz) + " Hz grows"};
     }
     if (!std::isfinite(level)) {
-      return Error{"a level is no finite number"};
+      return Error{"a level is not finite"};
     }
     partials.push_back(
         {mode.tone.frequency_hz, pole_radius(mode.tone.t60_s, options_.rate_hz), level});
     loudest = std::max(loudest, level);
   }
   if (!(loudest > 0.0)) {
-    return Error{"nothing is heard: no mode that swings reaches the output"};
+    return Error{"the output is silent: no oscillating mode reaches it"};
   }
   const auto heard = std::find_if(
       partials.begin(), partials.end(),
@@ -372,7 +372,7 @@ Result<AskedValues> StruckModel::figures_of(const Tuned& tuned, StruckAs how) co
     values[static_cast<std::size_t>(figure)] = is_there ? value : std::nullopt;
   };
   if (pitch >= partials.size()) {
-    return Error{"no mode that swings is left to be the pitch"};
+    return Error{"no oscillating mode is left that could be the pitch"};
   }
   const auto& [f0_hz, t60_s] = tuned.modes[pitch].tone;
   set(AskedFigure::f0, f0_hz);

@@ -387,7 +387,7 @@ TEST_CASE("a body is tuned by its own lines", "[bodies]") {
   const std::vector<double> wanted = {500.0};
   const auto tuned = tune_modes(network, parameter_values(network), wanted, {});
   REQUIRE_FALSE(tuned);
-  CHECK(tuned.error().message == "'b' has the frequencies that its own lines say: tune them there");
+  CHECK(tuned.error().message == "'b' gets its frequencies from its own lines; change them there");
   CHECK(tuned.error().line == 1);
 }
 

@@ -286,7 +286,8 @@ TEST_CASE("invalid figures and models without free parameters are rejected", "[a
   CHECK(asked(model, start, harmonic));
   const FiguresAt any = [](std::span<const double>) { return AskedValues{1.0, 1.0, 1.0}; };
   const TimbreTarget bright[] = {{AskedFigure::centroid, 2.0}};
-  CHECK(ask_timbre({any}, start, {}, bright, {}).error().message == "no parameter may be turned");
+  CHECK(ask_timbre({any}, start, {}, bright, {}).error().message ==
+        "no parameter is free to change");
   const FreeParameter one[] = {{0, 0.1, 0.3}};
   CHECK(ask_timbre({any}, start, one, {}, {}).error().message == "nothing is asked for");
   // What has no influence is where it was, and says so.
@@ -295,7 +296,7 @@ TEST_CASE("invalid figures and models without free parameters are rejected", "[a
   CHECK_FALSE(idle->has_influence);
   CHECK(idle->values == start);
   const TimbreTarget hollow[] = {{AskedFigure::odd_to_even, 2.0}};
-  CHECK(ask_timbre({any}, start, one, hollow, {}).error().message == "it has no odd_to_even there");
+  CHECK(ask_timbre({any}, start, one, hollow, {}).error().message == "the sound has no odd_to_even there");
 }
 
 TEST_CASE("a search handles silence, unstable corners and cancellation", "[ask]") {
@@ -307,7 +308,7 @@ TEST_CASE("a search handles silence, unstable corners and cancellation", "[ask]"
   const TimbreTarget bright[] = {{AskedFigure::centroid, 500.0}};
   const auto nothing = asked(silent, std::vector<double>{0.1}, bright);
   REQUIRE_FALSE(nothing);
-  CHECK(nothing.error().message.find("nothing is heard") != std::string::npos);
+  CHECK(nothing.error().message.find("the output is silent") != std::string::npos);
 
   // Above K = 4 M nothing is stable: the search goes around it.
   const Played corner{

@@ -185,7 +185,7 @@ TEST_CASE("IR-T6: leading silence, two channels, inverted sign and other rates a
 }
 
 TEST_CASE("IR-T7: noise alone gives an error", "[identify]") {
-  const std::string nothing = "nothing in it rings: no decaying tone rises out of its noise";
+  const std::string nothing = "nothing in it rings: no decaying tone stands above its noise";
   SECTION("white, at many rates") {
     for (const double rate_hz : {8000.0, 44100.0, 96000.0}) {
       CHECK(refusal({white(static_cast<std::size_t>(3.0 * rate_hz), 71)}, rate_hz) == nothing);
@@ -234,7 +234,7 @@ TEST_CASE("Hum and an offset are removed with a warning", "[identify]") {
   CHECK(worst.amplitude_db < 0.005);
   REQUIRE(found.warnings.size() == 2);
   CHECK(found.warnings[0].starts_with("it has an offset (DC) of "));
-  CHECK(found.warnings[1] == "a tone that cannot be seen to decay is left out, at 50.0 Hz");
+  CHECK(found.warnings[1] == "a tone without a measurable decay is left out, at 50.0 Hz");
 }
 
 TEST_CASE("Clipped samples are extrapolated from the sound after them", "[identify]") {
@@ -336,18 +336,19 @@ TEST_CASE("A mode limit keeps the strongest modes, none below the floor", "[iden
 }
 
 TEST_CASE("Unusable recordings are rejected with the reason", "[identify]") {
-  CHECK(refusal({}) == "there are no samples in it");
-  CHECK(refusal({{}}) == "there are no samples in it");
+  CHECK(refusal({}) == "the recording has no samples");
+  CHECK(refusal({{}}) == "the recording has no samples");
   CHECK(refusal({std::vector<double>(44100)}) == "it is silent: every sample is the same");
   CHECK(refusal({std::vector<double>(44100, 0.25)}) == "it is silent: every sample is the same");
-  CHECK(refusal({std::vector<double>(44100)}, 2000.0) == "its sample rate is below 4000 Hz");
+  CHECK(refusal({std::vector<double>(44100)}, 2000.0) ==
+        "its sample rate is below 4000 Hz; record at a higher rate");
   CHECK(refusal(std::vector<std::vector<double>>(17, std::vector<double>(100))) ==
-        "it has 17 channels; at most 16 are looked at");
+        "it has 17 channels; at most 16 are supported");
   std::vector<double> broken = ringing(damped, 0.5);
   broken[11025] = std::nan("");
-  CHECK(refusal({broken}) == "what stands at 0.25 s in channel 1 is no number");
+  CHECK(refusal({broken}) == "the sample at 0.25 s in channel 1 is not finite");
   broken[11025] = HUGE_VAL;
-  CHECK(refusal({broken}) == "what stands at 0.25 s in channel 1 is no number");
+  CHECK(refusal({broken}) == "the sample at 0.25 s in channel 1 is not finite");
   std::vector<double> late(44100);
   const std::vector<double> start = ringing(damped, 0.01);
   std::copy(start.begin(), start.end(), late.end() - 441);

@@ -164,13 +164,13 @@ TEST_CASE("cavities face inwards, and two bodies are rejected", "[surface]") {
   append(apart, box_surface({1.0, 1.0, 1.0}, {3.0, 0.0, 0.0}));
   const auto two = closed(apart);
   REQUIRE_FALSE(two);
-  CHECK(two.error().message.find("more than one body") != std::string::npos);
+  CHECK(two.error().message.find("more than one part") != std::string::npos);
 
   // A ball within the hollow hangs on nothing.
   append(shell, icosphere(1, 0.2, true));
   const auto rattle = closed(shell);
   REQUIRE_FALSE(rattle);
-  CHECK(rattle.error().message.find("more than one body") != std::string::npos);
+  CHECK(rattle.error().message.find("more than one part") != std::string::npos);
 }
 
 TEST_CASE("one-sided surfaces and surfaces without volume are rejected", "[surface]") {
@@ -184,7 +184,7 @@ TEST_CASE("one-sided surfaces and surfaces without volume are rejected", "[surfa
   const auto one_side = closed(plane);
   REQUIRE_FALSE(one_side);
   INFO(one_side.error().message);
-  CHECK(one_side.error().message.find("one side") != std::string::npos);
+  CHECK(one_side.error().message.find("one-sided") != std::string::npos);
 
   Surface flat = box_surface({1.0, 1.0, 0.0});
   const auto nothing = closed(flat);
