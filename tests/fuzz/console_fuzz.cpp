@@ -1,5 +1,5 @@
-// A libFuzzer target: whatever somebody types, there is an answer and the sound goes on. Files are
-// written in a folder of the run's own, and no other is named.
+// A libFuzzer target: any typed line gets a reply and the sound continues. Files are written to a
+// temporary folder of this run, and no other path is used.
 #include <unistd.h>
 #include <filesystem>
 
@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Where the files of the run lie and vanish with it.
+// Folder for the files of this run; removed at the end.
 struct Folder {
   const fs::path path = fs::temp_directory_path() / ("ressort-fuzz-" + std::to_string(getpid()));
   Folder() {

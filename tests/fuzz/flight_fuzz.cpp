@@ -1,5 +1,5 @@
-// A libFuzzer target: whatever bytes are given for a flight, they are read or refused with a line
-// and a sentence; what is read is written as a text that reads as the same.
+// A libFuzzer target: any bytes are read as a flight or rejected with a line and a message. A
+// flight that is read and printed reads back the same.
 #include <cstdint>
 #include <cstdlib>
 #include <string_view>

@@ -1,5 +1,5 @@
-// A libFuzzer target: whatever bytes a keyboard sends, cut into whatever packets, they are played
-// or counted. A byte gives the length of the packet after it, its highest bit the way in.
+// A libFuzzer target: any MIDI bytes, cut into any packets, are played or counted as malformed. One
+// byte gives the length of the next packet; its highest bit selects the input.
 #include "app/devices/midi_input.h"
 #include "tests/fuzz/player.h"
 #include "tests/system/every_control.h"

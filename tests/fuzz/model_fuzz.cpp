@@ -1,6 +1,6 @@
-// A libFuzzer target: whatever text comes, it is read or refused with a place and a sentence; what
-// is read comes back from its print, and if it is not too large it is exported, compiled and
-// played, and what is heard is finite.
+// A libFuzzer target: any text is read as a model or rejected with a position and a message. A
+// model that is read survives printing and parsing. If it is not too large it is exported, compiled
+// and played, and its output is finite.
 #include "core/model/faust/faust.h"
 #include "core/model/language/print.h"
 #include "core/model/topology.h"
@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t frames = 4096;
 constexpr std::size_t block_frames = 256;
-constexpr std::uint64_t most_nodes = 120;  // for speed alone: the reader takes millions
+constexpr std::uint64_t most_nodes = 120;  // For speed only: the reader accepts millions.
 
 void check_told(const ParsedNetwork& parsed) {
   for (const Diagnostic& diagnostic : parsed.diagnostics) {
@@ -29,8 +29,8 @@ bool is_small(const Network& network) {
   return nodes <= most_nodes;
 }
 
-// Keys, every gesture that an input can be asked for, controllers, one parameter after the other to
-// both ends and beyond; panic before the last block.
+// Keys, every gesture of an input, controllers, and each parameter in turn to both ends and beyond;
+// panic before the last block.
 std::vector<Event> events_of(const Instrument& instrument, std::size_t block) {
   const auto input = static_cast<std::uint16_t>(1 + block % 3);
   const std::array<Event, 9> gestures = {{
@@ -105,8 +105,8 @@ void play_blocks(Engine& engine, const Instrument& instrument, std::size_t first
   require(std::isfinite(engine.meters().energy) && std::isfinite(engine.meters().loss));
 }
 
-// As `play` does, and by force what it refuses: a gain that is found if nobody gives one, and
-// halfway the form that more patience finds, which goes on where the other is.
+// Plays like `play`, with --force if necessary: with a computed gain if none is given, and an
+// upgrade to a slower-to-find form halfway, which continues the sound.
 void play(const Network& network, Preset preset, CompileOptions options) {
   auto first = compile_network(network, preset, options);
   if (!first) {
@@ -129,7 +129,7 @@ void play(const Network& network, Preset preset, CompileOptions options) {
   play_blocks(*second->engine, second->instrument, blocks / 2, blocks);
 }
 
-// Every second label that keys can leave as it is.
+// Returns every second label that can be fixed.
 std::vector<std::string> fixed_labels(const Network& network) {
   std::vector<std::string> labels;
   for (std::size_t i = 0; i < network.macros.size(); i += 2) {
@@ -149,7 +149,7 @@ void play(const Network& network) {
   play(network, default_preset(network, true), {.rate_hz = 44100.0, .bare = true});
   const std::size_t turn = network.links.size() + 7 * network.masses.size();
   const auto written = parse_preset(support::PresetWriter(network, "fuzz.mdl", turn).write());
-  if (written.ok()) {  // a name may be no TOML, a range too wide
+  if (written.ok()) {  // The name may be invalid in TOML, or a range too wide.
     play(network, written.preset, {.rate_hz = 48000.0, .most_modes = quick_modes});
   }
 }

@@ -1,6 +1,6 @@
-// A libFuzzer target: whatever packets come to the OSC server, the sound goes on and it still
-// answers. A byte gives the length of the packet after it, its highest bit four times that. No file
-// is named but the program's own.
+// A libFuzzer target: after any packets the OSC server still replies and the sound continues. One
+// byte gives the length of the next packet; its highest bit multiplies it by four. Only the
+// program's own files are named.
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <poll.h>
@@ -34,11 +34,11 @@ class Sender {
     ::send(socket_, packet.data(), packet.size(), 0);
   }
 
-  // Until /status is answered, whatever has been said before; false after ten seconds of silence.
+  // Waits until /status is answered, skipping earlier replies; false after ten seconds of silence.
   bool is_answered() {
     static constexpr std::uint8_t status[] = {'/', 's', 't', 'a', 't', 'u', 's', 0, ',', 0, 0, 0};
     std::array<char, 65507> answer{};
-    for (int tries = 0; tries < 20; ++tries) {  // some have used up their answers for a while
+    for (int tries = 0; tries < 20; ++tries) {  // The reply budget may be used up for a while.
       send(status);
       pollfd wait{socket_, POLLIN, 0};
       while (poll(&wait, 1, 500) == 1) {

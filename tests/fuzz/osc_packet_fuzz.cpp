@@ -1,5 +1,5 @@
-// A libFuzzer target: whatever bytes come, the check neither reads beyond them nor lets liblo do
-// so.
+// A libFuzzer target: the packet check never reads out of bounds, and neither does liblo
+// afterwards.
 #include <lo/lo.h>
 
 #include <algorithm>
@@ -19,11 +19,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   std::size_t touched = 0;
   for (const ressort::OscMessage& message : *messages) {
-    // A copy of its own, so that a step over its end is seen.
+    // A separate copy, so that the sanitizer detects a read past the end.
     std::vector<std::uint8_t> bytes(message.bytes.begin(), message.bytes.end());
     const lo_message read = lo_message_deserialise(bytes.data(), bytes.size(), nullptr);
     if (read == nullptr) {
-      // What passes the check liblo takes, but for colours and for blobs that it finds too large.
+      // liblo accepts whatever passes the check, except colours and blobs that it finds too large.
       const bool may_refuse = bytes.size() > 32768 || std::count(bytes.begin(), bytes.end(), 'r');
       if (!may_refuse) {
         std::abort();

@@ -1,6 +1,6 @@
-// A libFuzzer target: whatever comes to the panel's port, the sound goes on and the page is still
-// served. The first byte says how much of a proper request stands around the rest: nothing, the
-// host, or all but a body.
+// A libFuzzer target: after any request the page is still served and the sound continues. The first
+// byte selects how much of a valid request surrounds the data: nothing, the host, or all but a
+// body.
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -17,7 +17,7 @@ namespace {
 
 using namespace ressort;
 
-// One program for all requests, as a browser finds it.
+// One program for all requests, as for a browser.
 struct Stage {
   Stage() {
     session.on_engine(
@@ -43,8 +43,7 @@ struct Stage {
   std::string host;
 };
 
-// What comes back, as far as a stream's first few kilobytes. Of what is no whole request nothing
-// does, and nobody waits for it.
+// Returns the first kilobytes of the reply. An incomplete request gets none, and is not waited for.
 std::string ask(const Stage& stage, std::string_view request, bool is_whole) {
   const int socket = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_in server{};
@@ -69,14 +68,14 @@ std::string ask(const Stage& stage, std::string_view request, bool is_whole) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static Stage& stage = *new Stage();  // its threads live as long as the program
+  static Stage& stage = *new Stage();  // Its threads live as long as the program.
   if (size == 0) {
     return 0;
   }
   const std::string rest(reinterpret_cast<const char*>(data) + 1, size - 1);
   const std::string host = "Host: " + stage.host + "\r\n";
   std::string request = rest;
-  if (data[0] % 3 == 1) {  // a line, the host, and what follows the line
+  if (data[0] % 3 == 1) {  // The request line, the host, and the data.
     const std::size_t line = std::min(rest.find('\n'), rest.size());
     request = rest.substr(0, line) + " HTTP/1.1\r\n" + host +
               rest.substr(std::min(line + 1, rest.size())) + "\r\n\r\n";

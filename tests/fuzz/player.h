@@ -1,4 +1,4 @@
-// fuzz: what is asked of whatever sounds, and how it is played to be asked.
+// fuzz: plays a model and checks its output.
 #pragma once
 
 #include <array>
@@ -27,9 +27,8 @@ inline std::string_view text_of(const std::uint8_t* data, std::size_t size) {
   return {reinterpret_cast<const char*>(data), size};
 }
 
-// Something of everything: a string that is struck, a mass that is bowed, one that is plucked, one
-// that is turned by sound, a body and a waveguide that hold each other, and parameters for all of
-// it.
+// A model with a struck string, a bowed mass, a plucked mass, a mass whose stiffness is an audio
+// input, a body and a waveguide that are linked, and parameters for all of them.
 inline const char* const model =
     "@K param 0.1\n@Z param 0.001\n@M param 1.\n@u param 0.5\n@a audioParam @in4\n"
     "@g ground 0.\n@s string 8 M K Z 0. 0.\n@m mass M 0. 0.\n@n osc 1. 0.05 0.001 0. 0.\n"
@@ -46,8 +45,8 @@ inline const Network& network() {
   return network;
 }
 
-// A process without a device; blocks of any length, some noise at its inputs. What comes out is a
-// number below full scale.
+// A process without a device; blocks of any length, noise at its inputs. The output is finite and
+// below full scale.
 class Harness {
  public:
   static constexpr double rate_hz = 48000.0;

@@ -1,5 +1,5 @@
-// A libFuzzer target: whatever text comes, it is read as a preset or refused with a place and a
-// sentence; what is read is put on a model that has something of everything, and played.
+// A libFuzzer target: any text is read as a preset or rejected with a position and a message. A
+// preset that is read is applied to a model with all elements, and played.
 #include "core/model/preset/preset.h"
 
 #include "app/control/registry.h"

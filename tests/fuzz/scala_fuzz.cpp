@@ -1,5 +1,5 @@
-// A libFuzzer target: any bytes as a scale and, behind the first 0, as a keyboard map. They are
-// read or refused with a place, and what they give is a frequency for every key.
+// A libFuzzer target: any bytes as a scale and, after the first 0, as a keyboard map. They are read
+// or rejected with a position, and every key gets a frequency.
 #include <cmath>
 
 #include "core/model/tuning/scala.h"

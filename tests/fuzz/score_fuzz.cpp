@@ -1,5 +1,5 @@
-// A libFuzzer target: whatever text comes, it is read as a score or refused with a line and a
-// sentence; each of its calls becomes events or is refused, and they are played.
+// A libFuzzer target: any text is read as a score or rejected with a line and a message. Each of
+// its messages becomes events or is rejected, and the events are played.
 #include "app/control/registry.h"
 #include "tests/fuzz/player.h"
 

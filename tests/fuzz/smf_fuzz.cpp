@@ -1,5 +1,5 @@
-// A libFuzzer target: whatever bytes are given for a MIDI file, they are read or refused with a
-// sentence; what is read is in order, and its messages are whole. What they do is midi_fuzz's.
+// A libFuzzer target: any bytes are read as a MIDI file or rejected with a message. The result is
+// in order and its messages are complete. midi_fuzz tests their effect.
 #include <cmath>
 #include <cstdlib>
 
@@ -23,7 +23,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     require(!midi.error().message.empty());
     return 0;
   }
-  require(midi->bytes.size() <= 2 * size);  // each data byte may get its running status
+  require(midi->bytes.size() <= 2 * size);  // Each data byte may get its running status.
   require(std::isfinite(midi->length_s) && midi->length_s <= 86400.0);
   double before_s = 0.0;
   for (const MidiFile::Message& message : midi->messages) {

@@ -1,5 +1,5 @@
-// Passive links that share masses, however many: judged by where everything is alone, with
-// potentials written down here and not by what the laws say of themselves.
+// Passive links that share masses, in any number: the energy is computed from positions, with
+// potentials defined in this file and not taken from the laws.
 #include <numeric>
 
 #include "core/laws/laws.h"
@@ -10,13 +10,13 @@ namespace {
 
 using namespace support;
 
-// What a law holds at a distance d, but for what is linear; its arguments in the order of the text.
+// Returns the nonlinear potential of a law at a distance d; arguments in the order of the text.
 long double held(Law law, const LawNumbers& c, long double d) {
   const auto clipped = [&](long double u) -> long double {
     if (c[1] == 0.0 || c[0] >= c[2]) {
       return (c[1] == 0.0 ? c[0] : c[2]) / 2.0L * u * u;
     }
-    const long double edge = (c[2] - c[0]) / c[1];  // squared
+    const long double edge = (c[2] - c[0]) / c[1];  // Squared.
     const long double bent = std::min(u * u, edge);
     return c[0] / 2.0L * bent + c[1] / 4.0L * bent * bent + c[2] / 2.0L * (u * u - bent);
   };
@@ -48,7 +48,7 @@ long double held(Law law, const LawNumbers& c, long double d) {
   return 0.0L;
 }
 
-// A network's energy, sample by sample, against what it had at first and what forces did to it.
+// Compares a network's energy in each sample with its initial energy and the work of forces.
 class EnergyJudge {
  public:
   explicit EnergyJudge(const std::string& text, Passivity passive = Passivity::always)
@@ -74,8 +74,8 @@ class EnergyJudge {
         links_.push_back({run.law, numbers, program.ends[i]});
       }
     }
-    // As the text has it: speeds, and potentials where masses start or, if they come from higher, a
-    // sample before.
+    // The initial energy from the text: kinetic energy, and potentials at the start or one sample
+    // earlier, whichever is larger.
     for (std::size_t i = 0; i < mass_.size(); ++i) {
       start += mass_[i] / 2.0L * v_[i] * v_[i];
     }
@@ -114,7 +114,7 @@ class EnergyJudge {
       const long double straight =
           linear(Role::stiffness) / 2.0L * there * d - linear(Role::damping) / 4.0L * speed * speed;
       energy += straight;
-      // What is linear does not pull in the first sample, and is what it is after it.
+      // Linear links exert no force in the first sample, and their usual one from the second.
       start += is_first_ ? straight : 0.0L;
     }
     is_first_ = false;
@@ -126,14 +126,14 @@ class EnergyJudge {
 
   const std::vector<double>& x() const { return body_.x; }
   const std::vector<double>& v() const { return body_.v; }
-  // How much is there of what could be.
+  // Returns the share of the available energy that is left.
   double kept() const { return static_cast<double>(energy / (start + work)); }
 
   long double start = 0.0L;
   long double work = 0.0L;
   long double passed = 0.0L;
   long double energy = 0.0L;
-  double excess = 0.0;  // the most that it ever had too much, of all that went through
+  double excess = 0.0;  // Largest surplus so far, relative to the energy that passed through.
   bool is_finite = true;
 
  private:
@@ -165,8 +165,8 @@ std::string mass(std::size_t i, double m, double x, double v) {
          "\n";
 }
 
-// Up to 40 masses and up to 200 links of any law between them and two walls, within six decades of
-// everything, most of them in one cluster.
+// Up to 40 masses and up to 200 links of any law between them and two walls, with coefficients over
+// six decades, most of them in one cluster.
 std::string any_cluster(std::uint64_t seed) {
   Random random(seed);
   const auto any = [&](double least, double most) {
@@ -251,8 +251,8 @@ TEST_CASE("no cluster of links has more energy than was put in", "[clusters]") {
   int exploded = 0;
   std::vector<std::uint64_t> seeds(120);
   std::iota(seeds.begin(), seeds.end(), 1);
-  // Of 3000, those that once made some: what starts at rest on a slope; links that push a mass to
-  // and fro far harder than it is heavy; a blow after which forces are 1e16 times what they add to.
+  // Seeds out of 3000 that once gained energy: masses that start at rest on a slope; links that are
+  // much stiffer than their mass is heavy; a strike after which forces are 1e16 times their sum.
   seeds.insert(seeds.end(), {399, 834, 907, 1275, 2026, 2120, 2136});
   for (const std::uint64_t seed : seeds) {
     INFO("seed " << seed << "\n" << any_cluster(seed));
@@ -266,9 +266,9 @@ TEST_CASE("no cluster of links has more energy than was put in", "[clusters]") {
 }
 
 TEST_CASE("lossless networks conserve energy with any number of links at a mass", "[clusters]") {
-  // Every mass by a law to every other and to a wall; chains; cradles whose balls touch from the
-  // start on. As it is the start, too, that must not lose: within a thousandth of what a hand
-  // brought along.
+  // Every mass linked by a law to every other and to a wall; chains; Newton's cradles whose balls
+  // touch at the start. The start must not lose energy either: within a thousandth of the initial
+  // energy.
   const auto all_to_all = [](const std::string& law, std::size_t masses) {
     std::string text = "~motion velocity\n@g ground 0.\n";
     for (std::size_t i = 0; i < masses; ++i) {
@@ -311,8 +311,9 @@ TEST_CASE("lossless networks conserve energy with any number of links at a mass"
 }
 
 TEST_CASE("a mass that starts inside a wall is held in its first sample", "[clusters]") {
-  // At 0.01 a sample from 0.001 before a wall of K/M = 10^4: elastic, so it leaves as it came, and
-  // is never deeper than v/sqrt(K/M) from where two samples' mean of its potential is v^2/2.
+  // A ball at 0.01 per sample, 0.001 before a wall with K/M = 10^4. It is elastic, so the ball
+  // leaves at the speed it came with. Its depth is at most v/sqrt(K/M) beyond the point where the
+  // mean potential of two samples is v^2/2.
   EnergyJudge ball(
       "~motion velocity\n@w ground 0.\n@m0 mass 1. -0.001 441.\n@c contact @m0 @w 10000. 0.\n"
       "@out1 posOutput @m0\n");

@@ -1,5 +1,5 @@
-// Every form that a random network has, and so every kernel that the plan may choose for it,
-// against the direct kernel in double.
+// Compares every kernel that the plan may choose for a random network with the direct kernel in
+// double.
 #include <map>
 #include <set>
 
@@ -41,7 +41,7 @@ std::vector<std::pair<Method, Form>> forms_of(const Program& program) {
   return forms;
 }
 
-// The whole network as one Program, and its parts where it has several.
+// The whole network as one Program, and its parts if it has several.
 std::vector<Program> programs_of(const Network& network) {
   std::vector<Program> programs = {make_program(network, Network::reference_rate_hz, true)};
   Machine machine = make_machine(network, Network::reference_rate_hz, true);
@@ -53,8 +53,7 @@ std::vector<Program> programs_of(const Network& network) {
   return programs;
 }
 
-// Rounding is half a thousand million times as coarse in float: what is followed there as well is
-// not chaotic.
+// Rounding in float is 5e8 times coarser. A network that float follows is not chaotic.
 void check_not_chaotic(const std::vector<Comparison>& direct) {
   for (const Comparison& output : direct) {
     INFO("direct has " << output.snr_db() << " dB in float");
@@ -90,8 +89,8 @@ void check_forms(Program program, const Score& score, const std::vector<Isa>& is
   }
 }
 
-// A bow's force steps when its profile is turned: on the same sample for everybody. The turns take
-// 128 samples, as everywhere, and none passes 0 on a sample.
+// A bow's force is discontinuous in its profile parameter, and must switch on the same sample in
+// every kernel. Changes take 128 samples, as everywhere, and none passes 0 on a sample.
 Score turned_score(const Program& program) {
   Score score = support::score_of(
       program, {.frames = 12000, .reach = 0.02, .lowest_hz = 2.0, .highest_hz = 40.0});
@@ -103,7 +102,7 @@ Score turned_score(const Program& program) {
   return score;
 }
 
-// What the first output is, by the book; `is_turned`: the first parameter, as the score has it.
+// The first output of the reference simulator; `is_turned`: the first parameter follows the score.
 std::vector<double> by_the_book(const Network& network, const Score& score, bool is_turned) {
   std::vector<double> parameters = parameter_values(network);
   auto oracle = reference::make_simulation(network, parameters);
@@ -128,7 +127,7 @@ std::vector<double> by_the_book(const Network& network, const Score& score, bool
   return heard;
 }
 
-// Each method takes some of them.
+// Each kernel supports some of the networks.
 void check_networks(const std::vector<Isa>& isas) {
   constexpr std::uint64_t networks = 208;
   std::map<Method, std::size_t> taken;

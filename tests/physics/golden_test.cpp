@@ -1,5 +1,5 @@
-// Numbers that were found elsewhere, to many digits: poles and samples of a few networks. Whoever
-// changes one of them changes what everybody's models sound like.
+// Poles and samples of a few networks, computed independently to many digits. A change here changes
+// the sound of every model.
 #include "core/analysis/linear.h"
 #include "tests/support/poles.h"
 
@@ -27,7 +27,7 @@ std::string string50() {
   return scenes::string("s", 50, "0.1", "0.001") + scenes::output(1, "s_m37");
 }
 
-// A mode's pole in the published scheme.
+// Returns a mode's pole in the published scheme.
 Pole published(double stiffness, double damping) {
   const double cosine = (2.0 - stiffness - damping) / (2.0 * std::sqrt(1.0 - damping));
   return support::pole_of(std::polar(std::sqrt(1.0 - damping), std::acos(cosine)));
@@ -38,7 +38,7 @@ struct Spectrum {
   Eigen::VectorXd damping;
 };
 
-// Where dampers are in proportion and masses alike; the slowest first.
+// For proportional damping and equal masses; the slowest mode first.
 Spectrum modes_of(const Program& program) {
   const support::Matrices matrices = support::matrices_of(program);
   const support::Eigenbasis modes = support::eigenbasis_of(matrices.stiffness);
@@ -48,8 +48,8 @@ Spectrum modes_of(const Program& program) {
       .damping = (shapes.transpose() * matrices.damping * shapes).diagonal() / matrices.mass(0)};
 }
 
-// Outputs of a network whose mass `node` was at -0.01 one sample ago, all others and it being at 0
-// now: [n] n samples from now.
+// Returns the outputs, [n] after n samples, of a network whose mass `node` was at -0.01 one sample
+// ago and is now at 0 like all others.
 std::vector<double> impulse(Program program, std::uint32_t node, std::size_t frames) {
   program.position[node] = -0.01;
   program.velocity[node] = 0.01;
@@ -143,7 +143,7 @@ TEST_CASE("golden: a string of 50", "[golden]") {
   const Program program = program_of(string50());
   const Spectrum modes = modes_of(program);
   const struct {
-    int mode;  // from 1
+    int mode;  // Counted from 1.
     double hertz, continuous_hz;
   } golden[] = {{1, 136.70267890413, 136.700388536816},   {2, 273.289403833959, 273.27110459234},
                 {3, 409.644225529081, 409.582598720605},  {10, 1347.89921816541, 1345.7051694068},
@@ -157,7 +157,7 @@ TEST_CASE("golden: a string of 50", "[golden]") {
     const auto i = static_cast<std::size_t>(row.mode - 1);
     check(published(modes.stiffness(row.mode - 1), modes.damping(row.mode - 1)).hertz, row.hertz,
           1e-12);
-    check(poles[i].hertz, row.hertz, 1e-10);  // as the kernel does it, one step at a time
+    check(poles[i].hertz, row.hertz, 1e-10);  // Computed by stepping the kernel.
     check(continuous[i].hertz, row.continuous_hz, 1e-10);
   }
   check(published(modes.stiffness(0), modes.damping(0)).t60_s, 82.58581636, 1e-9);
@@ -193,7 +193,7 @@ TEST_CASE("golden: the bowed string's string", "[golden]") {
   check(continuous_hz(149), 7688.20794789262, 1e-12);
 }
 
-// f0 = a M^b, b being very nearly -1/2, for a string of 48 masses between its ends.
+// f0 = a M^b with b close to -1/2, for a string of 48 masses.
 TEST_CASE("golden: a string's pitch by its mass is a power law", "[golden]") {
   double count = 0.0;
   double sum_x = 0.0;

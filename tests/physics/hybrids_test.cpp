@@ -1,5 +1,5 @@
-// Masses, places on strings of masses, on bodies and on waveguides, held to each other by
-// everything that holds: the books of energy, with potentials written down here.
+// Energy balance of masses and places on strings, bodies and waveguides, joined by every kind of
+// link, with potentials defined in this file.
 #include "core/compile/stability_check.h"
 #include "core/kernels/direct/direct.h"
 #include "core/kernels/passive/clusters.h"
@@ -17,7 +17,7 @@ std::string number(double value) {
   return text;
 }
 
-// What a link made passive holds at a distance, its arguments in the order of the text.
+// Returns the potential of a passive link at a distance; arguments in the order of the text.
 double held(Law law, const LawNumbers& c, double d) {
   const double far = std::fabs(d);
   switch (law) {
@@ -43,7 +43,7 @@ double held(Law law, const LawNumbers& c, double d) {
       return c[0] / 20.0 * slope * slope + 0.45 * c[0] * hill;
     }
     default:
-      return 0.0;  // bows hold nothing
+      return 0.0;  // Bows store no energy.
   }
 }
 
@@ -58,7 +58,7 @@ double friction(Law law, const LawNumbers& c, double v) {
                            : 0.0;
 }
 
-// Everything is known of a network that rests: the text says what moves.
+// The energy balance of a network that starts at rest.
 class Books {
  public:
   explicit Books(const std::string& text, bool is_published = false)
@@ -77,7 +77,7 @@ class Books {
       v[i] = all_v[i * lanes];
     }
     const Program& program = bare_.program();
-    // Of forces and frictions: how far their ends went in two samples.
+    // Work of forces and friction: displacement of their ends over two samples.
     for (std::size_t i = 0; i < program.inputs.size(); ++i) {
       const std::uint32_t node = program.inputs[i].node;
       work += inputs[i] * (v[node] + v_[node]) / 2.0;
@@ -99,7 +99,7 @@ class Books {
         const double d = x[a] - x[b];
         const double speed = v[a] - v[b];
         if (run.scheme == Scheme::plain) {
-          energy += 0.5 * c[0] * d * (d - speed);  // springs
+          energy += 0.5 * c[0] * d * (d - speed);  // Springs.
           continue;
         }
         energy += 0.5 * (held(run.law, c, d) + held(run.law, c, d - speed));
@@ -116,8 +116,8 @@ class Books {
   }
 
   double energy = 0.0;
-  double work = 0.0;    // that forces did
-  double rubbed = 0.0;  // that friction took
+  double work = 0.0;    // Work of forces.
+  double rubbed = 0.0;  // Friction loss.
   double scale = 0.0;
 
  private:
@@ -146,7 +146,7 @@ class Books {
 
 struct End {
   const char* name;
-  const char* text;  // what it stands on; # is a letter
+  const char* text;  // Network under the link; # is replaced by a letter.
   const char* place;
 };
 
@@ -167,8 +167,8 @@ std::string of(const char* text, char letter) {
   return out;
 }
 
-// The largest share of all energy that the books are off, once the forces of the first samples are
-// over; K of the link by the softest of what it holds, which is about 1.
+// Returns the largest relative error of the balance after the forces of the first samples. The
+// link's K is scaled to the softest element it holds, which is about 1.
 double off_books(const std::string& text, int frames = 6000) {
   Books books(text);
   double off = 0.0;
@@ -186,8 +186,8 @@ double off_books(const std::string& text, int frames = 6000) {
   return off;
 }
 
-// The same, but for what is lost: hills and friction among each other may hold in several ways, and
-// where none is found in time all is held back (joint.h).
+// The same, counting gains only: combined hills and friction can have several solutions, and if
+// none is found in time the links are held (joint_solver.h), which loses energy.
 double excess_of(const std::string& text, int frames) {
   Books books(text);
   double excess = 0.0;
@@ -202,8 +202,8 @@ double excess_of(const std::string& text, int frames) {
   return excess;
 }
 
-// So many contacts with the ground at many heights, and some with a mass each; `place` says where
-// on a string or a body.
+// Returns this many contacts with the ground at various heights, some of them with a mass; `place`
+// returns a place on a string or body.
 template <class Place>
 std::string crowd(int links, Place&& place) {
   Random random(20);
@@ -241,7 +241,7 @@ TEST_CASE("links between masses, places and waveguides balance the energy", "[hy
         for (const double k : {0.01, 0.1, 1.0, 10.0, 100.0, 1000.0}) {
           const bool has_plain = law == "spring" || law == "quadratic" || law == "cubic";
           if (has_plain && !has_waveguide) {
-            continue;  // whose springs are as published, and limited
+            continue;  // Its springs use the published scheme and are limited.
           }
           const std::string between = of(a.place, 'a') + " " + of(b.place, 'b');
           const std::string link =
@@ -272,8 +272,8 @@ TEST_CASE("links between masses, places and waveguides balance the energy", "[hy
 }
 
 TEST_CASE("a released string keeps its energy after a pluck, bow or contact", "[hybrids]") {
-  // A hand that sweeps past, one that draws and then outruns all friction, one that pushes and
-  // leaves: where it is in sample n. Nothing else takes anything, for ten seconds.
+  // Position inputs that sweep past, that pull and then outrun all friction, and that push and
+  // leave: their position in sample n. Nothing else removes energy for ten seconds.
   static constexpr int let_go = 22050;
   constexpr int second = 44100;
   struct Hand {
@@ -382,14 +382,14 @@ TEST_CASE("a damper between waveguides removes exactly its friction loss", "[hyb
 }
 
 TEST_CASE("clusters with few places are solved by the places", "[hybrids]") {
-  // By its links a crowd needs 2 N^2 numbers a lane, here 6.4 GB; by three places
-  // and N/7 masses what each link and each mass needs.
+  // Solving by links would need 2 N^2 numbers per lane, here 6.4 GB. By three places and N/7 masses
+  // it needs memory proportional to the links and masses.
   constexpr int many = 20'000;
   const std::string text = crowd(many, one_of_three);
   const Network network = expand_macros(network_of(text));
   const Program program =
       make_program(network, Network::reference_rate_hz, true, choose_schemes(network, {}).links);
-  CHECK(program.taps.size() == 6);  // with the inputs' and the output's
+  CHECK(program.taps.size() == 6);  // Includes those of inputs and output.
   const PassiveTables tables = passive_tables(program);
   REQUIRE(tables.clusters.size() == 2);
   for (const Cluster& cluster : tables.clusters) {
@@ -403,7 +403,7 @@ TEST_CASE("clusters with few places are solved by the places", "[hybrids]") {
 }
 
 TEST_CASE("the solutions by places and by links agree", "[hybrids]") {
-  // Places that each are a parameter of their own are many, though all of them are at one.
+  // Places with separate parameters count separately, even at equal positions.
   const std::string by_place = crowd(12, [](int) { return std::string("[@s u1]"); });
   const std::string by_link = crowd(12, [](int i) { return "[@s u" + std::to_string(i) + "]"; });
   const auto clusters_of = [](const std::string& text) {
@@ -429,8 +429,8 @@ TEST_CASE("the solutions by places and by links agree", "[hybrids]") {
 }
 
 TEST_CASE("any links among few places balance the energy", "[hybrids]") {
-  // Among three places of a body that has two modes, so that one goes with the others, two of a
-  // string, one of a waveguide, two masses and the ground.
+  // Links among three places of a body with two modes, one of which is therefore dependent, two
+  // places of a string, one of a waveguide, two masses and the ground.
   constexpr std::array<const char*, 9> held = {
       "[@d a]", "[@d b]", "[@d c]", "[@s 0.3]", "[@s 0.71]", "[@w 0.31]", "@h1", "@h2", "@g"};
   Random random(77);
@@ -465,12 +465,12 @@ TEST_CASE("any links among few places balance the energy", "[hybrids]") {
     }
     text += "@in1 frcInput [@d a]\n@in2 frcInput [@s 0.5]\n@out1 posOutput [@d b]\n";
     INFO(text);
-    // In each sample as much as rounding leaves of the forces: 2^-50 of their work, 2000 times.
+    // Rounding of the forces: 2^-50 of their work per sample, for 2000 samples.
     CHECK(excess_of(text, 2000) < 1e-11);
   }
 }
 
-// Beyond it most grow; what holds the heaviest waves may last a little longer.
+// Beyond the limit most grow; links on the heaviest waves may last a little longer.
 TEST_CASE("random hybrids are stable below the limit of their masses", "[hybrids]") {
   Random random(1401);
   int grown = 0;

@@ -1,4 +1,4 @@
-// Whatever is done to a network of passive links, it never holds more energy than it was given.
+// A network of passive links never holds more energy than it was given, under any input.
 #include "core/engine/energy.h"
 #include "core/laws/laws.h"
 #include "tests/support/passive.h"
@@ -8,15 +8,15 @@ namespace {
 
 using namespace support;
 
-// Of any size within so many decades.
+// Returns a log-uniform random number.
 double of_any_size(Random& random, double least, double most) {
   return least * std::pow(most / least, random.uniform(0.0, 1.0));
 }
 
-// Masses on springs that are stable, and bent links of every kind but plucks, far stiffer than the
-// published scheme can take, most of them sharing masses; two hands that hold bent links only, and
-// are heard for what they hold against; two forces. Bows are as strong as the discrete gradient
-// allows.
+// Masses on stable springs, and nonlinear links of every law except plucks, far stiffer than the
+// published scheme allows, most of them sharing masses; two position inputs, attached to nonlinear
+// links only, whose reaction force is an output; two force inputs. Bows are as strong as the
+// discrete gradient allows.
 std::string abused(std::uint64_t seed) {
   Random random(seed);
   const std::size_t masses = 1 + random.below(6);
@@ -78,7 +78,7 @@ std::string abused(std::uint64_t seed) {
   return text;
 }
 
-// A network, and what was put into it.
+// A network and the energy put into it.
 class Ledger {
  public:
   Ledger(const std::string& text, Passivity passive)
@@ -106,7 +106,8 @@ class Ledger {
     for (std::size_t i = 0; i < inputs.size(); ++i) {
       const InputSlot& input = program.inputs[i];
       const double way = .5 * (body_.v[input.node] + v_[input.node]);
-      // Hands hear what passive links did, and what plain ones are about to do.
+      // The reaction force on a position input includes passive links of this sample and plain
+      // links of the next.
       const double force =
           input.is_force ? inputs[i] : -(before[input.node] + heard[i] - force_[input.node]);
       work += force * way;
@@ -118,21 +119,21 @@ class Ledger {
     is_finite = is_finite && std::isfinite(now);
   }
 
-  // What it got of nothing, as a share of what there was at first and of all that went in and out.
+  // Returns the energy gained from nothing, relative to the initial energy and all work.
   double excess() const { return created / passed; }
 
-  double created = 0.0;  // in all samples that gained any
+  double created = 0.0;  // Sum over all samples with a gain.
   double passed = 0.0;
   bool is_finite = true;
 
  private:
-  // as if all were played by the discrete gradient.
+  // Energy as if all links used the discrete gradient.
   Energy energy() const {
     return energy_of(passive_, LaneValues<double>{coefficients_.data(), 1}, body_.x.data(),
                      body_.v.data());
   }
 
-  // What plain links do in the next sample.
+  // Forces of plain links in the next sample.
   void pull() {
     std::fill(force_.begin(), force_.end(), 0.0);
     const Program& program = body_.program();
@@ -157,12 +158,12 @@ class Ledger {
   double last_ = 0.0;
   Stepper<double> body_;
   Program passive_;
-  std::vector<double> coefficients_;  // of that
+  std::vector<double> coefficients_;  // Coefficients of `passive_`.
   std::vector<double> force_;         // [node]
-  std::vector<double> v_;             // a sample ago
+  std::vector<double> v_;             // One sample ago.
 };
 
-// Strikes over six decades of force; hands that rest, sweep and jump.
+// Strikes over six decades of force; position inputs that rest, sweep and jump.
 void abuse(Ledger& ledger, std::uint64_t seed, int frames) {
   Random random(seed);
   std::vector<double> inputs = {0.0, 0.1, 0.0, 0.0};

@@ -1,4 +1,4 @@
-// A waveguide that something holds on to: keys are in tune all the same, judged by the sound.
+// A waveguide with attached elements stays in tune over the keys, measured from the sound.
 #include "core/compile/compile.h"
 #include "tests/support/harness.h"
 #include "tests/support/pitch.h"
@@ -8,7 +8,7 @@ namespace {
 
 using namespace support;
 
-// The lowest partial of a key, heard where the model listens, against the key.
+// Returns the deviation of a key's lowest partial from the key, at the model's output.
 double cents_of(const std::string& text, const std::string& keys, int key, double rate_hz) {
   const ParsedPreset parsed =
       parse_preset("model = \"guide.mdl\"\ngain = 1\n" + keys +
@@ -39,8 +39,9 @@ const std::string box =
 }  // namespace
 
 TEST_CASE("a string on a stiff bridge is in tune at every key", "[loaded_waveguide]") {
-  // What lies behind the bridge makes the string shorter: tuned as if nothing held it, keys were 53
-  // cents sharp. No key here is within 50 cents of the box's modes, where it would sound as two.
+  // The part of the string behind the bridge shortens it: tuned as an unloaded waveguide, keys were
+  // 53 cents sharp. No key here is within 50 cents of a mode of the body, where the pitch would
+  // split.
   const std::string guitar = "@s waveguide 1.4 110. 8. 0.4 0.\n" + box +
                              "@bridge spring [@s 0.97] [@box bridge] 4. 0.002\n"
                              "@in1 frcInput [@s 0.2]\n@out1 posOutput [@s 0.6]\n";
@@ -55,18 +56,18 @@ TEST_CASE("a string on a stiff bridge is in tune at every key", "[loaded_wavegui
 
 TEST_CASE("masses and springs on a waveguide keep it in tune", "[loaded_waveguide]") {
   const std::string loads[] = {
-      // a mass and a plain spring elsewhere in the same network
+      // A mass and a plain spring elsewhere in the network.
       "@m mass 8. 0. 0.\n@k spring [@s 0.31] @m 0.3 0.001\n@g ground 0.\n@h spring @m @g 0.2\n",
-      // a finger that damps and stiffens
+      // A finger that damps and stiffens.
       "@g ground 0.\n@h spring [@s 0.45] @g 0.01 0.002\n",
-      // a string of masses beside it
+      // A string of masses beside it.
       "@t string 9 1. 0.02 0.0005 0. 0.\n@k spring [@s 0.77] [@t 0.5] 0.02 0.0005\n",
-      // two places, tied to one mass
+      // Two places tied to one mass.
       "@m mass 30. 0. 0.\n@k spring [@s 0.9] @m 0.7\n@l spring [@s 0.95] @m 0.6 0.01\n",
-      // a body that two springs hold, one of them within itself
+      // A body held by two springs, one of them between its own places.
       "@b body 400. p q\n@b_1 mode @b 310. 2. 1. -0.4\n@b_2 mode @b 701. 1. 0.5 1.\n"
       "@k spring [@s 0.9] [@b p] 0.2 0.001\n@l spring [@b p] [@b q] 0.05\n",
-      // another waveguide, tied by its bridge
+      // Another waveguide, tied by its bridge.
       "@t waveguide 1. 370. 3. 0.3 0.\n@k spring [@s 0.93] [@t 0.88] 0.9 0.01\n"};
   for (const std::string& load : loads) {
     for (const int key : {40, 55, 66, 79}) {

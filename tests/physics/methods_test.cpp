@@ -1,5 +1,5 @@
-// Whole engines by every method, played and swept in every way: the same sound as by the direct
-// one, and no call of the heap.
+// Engines with every kernel, played and swept: the same sound as with the direct kernel, and no
+// heap calls.
 #include <set>
 
 #include "app/realtime/process.h"
@@ -13,12 +13,12 @@ using namespace support;
 
 constexpr std::size_t second = 44100;
 
-// An instrument that rings as it is played here for a second. Nothing in it is chaotic: where a
-// link is not linear, it is soft beside the springs and its force has no steps.
+// An instrument that rings for a second. It is not chaotic: nonlinear links are soft compared with
+// the springs, and their force is continuous.
 struct Subject {
   std::string name;
   std::string text;
-  std::set<Method> methods;  // that take some of it, besides the direct one
+  std::set<Method> methods;  // Kernels that support some of it, besides the direct one.
   bool is_linear = true;
 };
 
@@ -80,7 +80,7 @@ Preset preset_of(const Network& network, bool bare, int voices) {
   Preset preset;
   preset.voices = voices;
   preset.keyboard = !bare;
-  preset.budget.passive = Passivity::never;  // which not every method knows how to be
+  preset.budget.passive = Passivity::never;  // Not every kernel supports passive links.
   preset.controls.push_back(
       {.target = "in1", .gesture = Gesture::impulse, .low = 0.001, .high = 0.01});
   for (const Input& input : network.inputs) {
@@ -101,8 +101,8 @@ Preset preset_of(const Network& network, bool bare, int voices) {
   return preset;
 }
 
-// A second of everything at once: more notes than voices, a bend that never rests, parameters that
-// turn faster than their ramps end, hands that jump, pushes that last.
+// A second of everything at once: more notes than voices, continuous bends, parameters that change
+// before their ramps end, jumping position inputs, long pushes.
 std::vector<Event> gestures(const Network& network, std::uint64_t seed) {
   Random random(seed);
   std::vector<Event> events;
@@ -131,7 +131,7 @@ std::vector<Event> gestures(const Network& network, std::uint64_t seed) {
   return events;
 }
 
-// Each channel is a hand of its own; the third may be a stiffness, and stays one.
+// Each channel drives one input; the third may be a stiffness and stays positive.
 std::vector<std::vector<double>> audio_of(std::uint64_t seed) {
   std::vector<std::vector<double>> audio;
   for (const double low : {0.0, 0.0, 0.03}) {
@@ -200,13 +200,13 @@ void check_methods(const Subject& subject, bool bare, int voices) {
   }
 }
 
-// A model and the method by which it is played until the next one takes its place.
+// A model and the kernel that plays it until the next one replaces it.
 struct Turn {
   const Subject* subject = nullptr;
   Method method = Method::direct;
 };
 
-// Every model by each of its methods, the models changing every time.
+// Returns every model with each of its kernels, changing the model every time.
 std::vector<Turn> turns_of(const std::vector<Subject>& all) {
   std::vector<Turn> turns;
   for (std::size_t round = 0; round < methods_for(KernelRow::Use::published).size(); ++round) {
@@ -219,7 +219,7 @@ std::vector<Turn> turns_of(const std::vector<Subject>& all) {
   return turns;
 }
 
-// What a process plays while models follow each other: [channel][frame].
+// The output of a process while models follow each other: [channel][frame].
 struct Show {
   Process process{44100.0, false};
   std::vector<std::vector<double>> out = std::vector<std::vector<double>>(3);
@@ -269,7 +269,7 @@ TEST_CASE("models with different kernels are swapped", "[methods]") {
   const std::vector<Subject> all = subjects();
   Show plain;
   Show mixed;
-  // Some follow before the last one has faded.
+  // Some models follow before the previous one has faded.
   for (std::size_t i = 0; const Turn& turn : turns_of(all)) {
     const std::size_t frames = i++ % 3 == 0 ? 1000 : 6000;
     plain.perform(turn, true, frames);

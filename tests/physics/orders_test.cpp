@@ -1,4 +1,4 @@
-// How fast each scheme nears what it stands for as the time step is halved: its order.
+// The order of convergence of each scheme as the time step is halved.
 #include "tests/support/passive.h"
 #include "tests/support/poles.h"
 
@@ -7,17 +7,17 @@ namespace {
 
 using namespace support;
 
-// Of the errors at a step and at half of it.
+// Order from the errors at a step and at half of it.
 double order_of(double coarse, double fine) {
   return std::log2(coarse / fine);
 }
 
 struct PoleErrors {
-  double pitch = 0.0;  // the worst, as a share
+  double pitch = 0.0;  // Worst relative errors.
   double decay = 0.0;
 };
 
-// Of a string, at so many times the rate.
+// Errors of a string at `times` the rate.
 PoleErrors errors_at(int times, const std::string& z) {
   const Program program =
       make_program(network_of(scenes::string("s", 6, "0.05", z)), 44100.0 * times, true);
@@ -32,7 +32,7 @@ PoleErrors errors_at(int times, const std::string& z) {
   return errors;
 }
 
-// Where a mass is that a smooth push of 80 samples throws at `link`, 160 samples after it began.
+// Position of a mass that a smooth push of 80 samples throws at `link`, 160 samples after it began.
 double place_at(int times, const std::string& link, Passivity passive = Passivity::always) {
   const Network network =
       network_of("@g ground 0.\n@in1 posInput 0.\n@in2 frcInput @m\n@m osc 1. 0.002 0. 0. 0.\n" +
@@ -66,9 +66,9 @@ TEST_CASE("springs, contacts and friction converge with the stated order", "[ord
     double published;
     double margin = .1;
   };
-  // A kink in the force, as where a contact is touched, costs a discrete gradient no order; the
-  // published contact's is uneven, as it sees the kink a share of a sample late. What damps or rubs
-  // is of the first as published, and where a spring that bends is damped.
+  // A kink in the force, as at a contact's edge, costs a discrete gradient no order. The published
+  // contact converges irregularly, because it sees the kink a fraction of a sample late. Published
+  // damping and friction are of first order, as are damped nonlinear springs.
   for (const Case& c :
        {Case{"nlSpring3 @m @g 0.001 0.5 0.", 2.0, 2.0},
         Case{"nlSpring2 @m @g 0.001 0.1 0.", 2.0, 2.0},

@@ -1,5 +1,4 @@
-// Links that cannot gain energy, one mass at a time: against closed forms, and against what the
-// published scheme makes of the same.
+// Passive links on single masses, compared with closed forms and with the published scheme.
 #include "tests/support/passive.h"
 #include "core/laws/laws.h"
 
@@ -9,7 +8,7 @@ namespace {
 using namespace support;
 using laws::LinkState;
 
-// How much of its speed a ball keeps that comes down on a wall from anywhere between two samples.
+// Returns the ratio of speeds after and before a bounce, for impacts at any phase between samples.
 Spread bounces(double k, double z, Passivity passive, int phases = 1000) {
   Stepper<double> ball(
       "@w ground 0.\n@b mass 1. 0. 0.\n@c contact @w @b " + show(k) + " " + show(z) + "\n",
@@ -26,8 +25,7 @@ Spread bounces(double k, double z, Passivity passive, int phases = 1000) {
   return e;
 }
 
-// A mass on a spring to a ground, by any law; and an amplitude it starts from, at rest at sample 0
-// but for the half of what pulls it back from there.
+// A mass held by any law, started at rest at an amplitude, corrected for half of the initial force.
 Stepper<double> sprung(const std::string& law, const std::string& arguments, double amplitude,
                        double pull, Passivity passive) {
   Stepper<double> mass("@g ground 0.\n@b mass 1. 0. 0.\n@s " + law + " @g @b " + arguments + "\n",
@@ -37,7 +35,7 @@ Stepper<double> sprung(const std::string& law, const std::string& arguments, dou
   return mass;
 }
 
-// In samples, over so many of them.
+// Mean period over several periods, in samples.
 double period(Stepper<double>& mass, int periods) {
   double first = 0.0;
   double last = 0.0;
@@ -56,8 +54,8 @@ double cents(double ratio) {
   return 1200.0 * std::log2(ratio);
 }
 
-// Of x'' = -k x - q x^3 from an amplitude: T = 4 K(m)/w with w^2 = k + q a^2, m = q a^2/(2 w^2),
-// and K by the arithmetic-geometric mean.
+// The period of x'' = -k x - q x^3 at amplitude a: T = 4 K(m)/w with w^2 = k + q a^2, m = q a^2/(2
+// w^2), and K by the arithmetic-geometric mean.
 double duffing_period(double k, double q, double a) {
   const double w = std::sqrt(k + q * a * a);
   double one = 1.0;
@@ -70,7 +68,7 @@ double duffing_period(double k, double q, double a) {
   return 2.0 * std::numbers::pi / (one * w);
 }
 
-// The smallest amplitude, in thousandths, from which a spring blows up as published.
+// The smallest amplitude, in thousandths, at which the published spring diverges.
 double blows_up_at(const std::string& law, const std::string& arguments) {
   Stepper<double> mass = sprung(law, arguments, 0.0, 0.0, Passivity::never);
   for (double a = 0.4;; a += 1e-3) {
@@ -87,11 +85,11 @@ double blows_up_at(const std::string& law, const std::string& arguments) {
 }  // namespace
 
 TEST_CASE("S08, T10: a ball leaves a lossless wall at the speed it came with", "[passive]") {
-  // Reference: 1, exactly. As published the speed depends on where between two samples it touches.
+  // Reference: exactly 1. In the published scheme the speed depends on the phase of the impact.
   struct Row {
     double k;
     double lowest;
-    double highest;  // of the published scheme
+    double highest;  // Of the published scheme.
   };
   for (const auto& [k, lowest, highest] : {Row{.01, .9988, 1.0012},
                                            {.1, .995, 1.005},
@@ -117,7 +115,7 @@ TEST_CASE("S08, T10: a ball leaves a lossless wall at the speed it came with", "
 }
 
 TEST_CASE("S09, T12: a damped wall dissipates the correct energy", "[passive]") {
-  // Reference: the wall lets go where it began, so e = exp(-pi xi/sqrt(1 - xi^2)).
+  // Reference: the contact ends where it began, so e = exp(-pi xi/sqrt(1 - xi^2)).
   const auto closed = [](double k, double z) {
     const double xi = z / (2.0 * std::sqrt(k));
     return std::exp(-std::numbers::pi * xi / std::sqrt(1.0 - xi * xi));
@@ -133,7 +131,7 @@ TEST_CASE("S09, T12: a damped wall dissipates the correct energy", "[passive]") 
       CHECK(e.highest <= 1.0);
     }
   }
-  // As published it may be far off, and gain.
+  // The published scheme deviates and can gain energy.
   const Spread hard = bounces(.5, .2, Passivity::never);
   CHECK(hard.lowest == Approx(.502).margin(2e-3));
   CHECK(hard.highest == Approx(.677).margin(2e-3));
@@ -142,7 +140,7 @@ TEST_CASE("S09, T12: a damped wall dissipates the correct energy", "[passive]") 
 }
 
 TEST_CASE("S10, T11: a ball bounces for ever, no higher and no lower", "[passive]") {
-  // Reference: E/E0 = 1 over 10^6 samples, E = v^2/2 + g h + what is in the wall.
+  // Reference: E/E0 = 1 over 10^6 samples, E = v^2/2 + g h + energy of the wall.
   const auto energy = [](double k, double g, double x, double v) {
     const auto wall = [=](double depth) { return depth > 0.0 ? k / 2.0 * depth * depth : 0.0; };
     const double before = x - v;
@@ -171,7 +169,7 @@ TEST_CASE("S10, T11: a ball bounces for ever, no higher and no lower", "[passive
 }
 
 TEST_CASE("S11: a damped ball comes to rest", "[passive]") {
-  // Reference: x = -M g/K = -2e-5, after a finite number of touches.
+  // Reference: x = -M g/K = -2e-5 after finitely many impacts.
   for (const Passivity passive : {Passivity::never, Passivity::always}) {
     Stepper<double> ball("@w ground 0.\n@b massG 1. 1e-5 0.01 0.01\n@c contact @w @b 0.5 0.05\n",
                          passive);
@@ -194,7 +192,7 @@ TEST_CASE("S11: a damped ball comes to rest", "[passive]") {
 }
 
 TEST_CASE("S05: a cubic spring is stable at any amplitude", "[passive]") {
-  // Reference: bounded, by its energy. As published it blows up at these amplitudes.
+  // Reference: bounded by its energy. The published scheme diverges at these amplitudes.
   const std::vector<std::pair<double, double>> published = {
       {0., .771}, {.1, .806}, {1., .635}, {2., .593}};
   for (const auto& [k, amplitude] : published) {
@@ -250,12 +248,12 @@ TEST_CASE("S06: a quadratic spring is stable at any amplitude", "[passive]") {
 }
 
 TEST_CASE("S07, T13: a Duffing oscillator has its linear period at small amplitudes", "[passive]") {
-  // Reference: elliptic periods. By its discrete gradient it is flat when it swings far; never
+  // Reference: elliptic periods. The discrete gradient is flat at large amplitudes and never
   // unstable.
   struct Row {
     double amplitude;
     double samples;
-    double published;  // cents, 0 where it blows up
+    double published;  // Cents; 0: it diverges.
     double passive;
   };
   for (const auto& [a, samples, published, passive] : {Row{.05, 57.688455448, .85, -1.0},
@@ -275,7 +273,7 @@ TEST_CASE("S07, T13: a Duffing oscillator has its linear period at small amplitu
     CHECK(plain == Approx(published).margin(.1).epsilon(.03));
     CHECK(found == Approx(passive).margin(.1).epsilon(.04));
   }
-  // 10^7 samples at 20, where the published scheme is gone at once.
+  // 10^7 samples at amplitude 20, where the published scheme diverges at once.
   Stepper<double> mass = sprung("nlSpring3", "0.01 1. 0.", 20.0, 0.0, Passivity::always);
   const auto energy = [&] {
     const double before = mass.x[0] - mass.v[0];
@@ -289,7 +287,8 @@ TEST_CASE("S07, T13: a Duffing oscillator has its linear period at small amplitu
     drift = std::max(drift, std::fabs(energy() / start - 1.0));
   }
   CAPTURE(show(drift));
-  CHECK(drift < 3e-11);  // 2.75e-11: x += v where v is far larger; two positions keep 4e-13
+  // 2.75e-11, from x += v where v is much larger; a two-position form keeps 4e-13.
+  CHECK(drift < 3e-11);
   Stepper<double> published = sprung("nlSpring3", "0.01 1. 0.", 20.0, 0.0, Passivity::never);
   for (int n = 0; n < 20; ++n) {
     published.go();
@@ -298,7 +297,7 @@ TEST_CASE("S07, T13: a Duffing oscillator has its linear period at small amplitu
 }
 
 TEST_CASE("S20: a clipped spring is continuous and gains no energy", "[passive]") {
-  // s = .01, c = 10, k = .5 without damping, from .2, which is below b = sqrt((k - s)/c) = .2214.
+  // s = .01, c = 10, k = .5 without damping, from .2, below b = sqrt((k - s)/c) = .2214.
   const double b = std::sqrt(.49 / 10.0);
   const laws::ClippedSpring<double> spring{.01, 10., .5, 0.};
   CHECK(spring.force(b * (1 - 1e-12), 0.) ==
@@ -318,8 +317,8 @@ TEST_CASE("S20: a clipped spring is continuous and gains no energy", "[passive]"
   }
   CAPTURE(show(drift), most);
   CHECK(drift < 1e-11);
-  CHECK(most < .2 * 1.06);  // at rest between two samples: a little above where both are
-  // Beyond b it is damped, so it can only lose.
+  CHECK(most < .2 * 1.06);  // At rest between two samples: slightly above both.
+  // Beyond b it is damped, so it can only lose energy.
   Stepper<double> far = sprung("nlSpringDamper", "0.01 10. 0.5 0.", 5.0, 0.0, Passivity::always);
   for (int n = 0; n < 1000; ++n) {
     far.go();
@@ -366,7 +365,7 @@ TEST_CASE("the force on a ball equals its change of momentum", "[passive]") {
 }
 
 TEST_CASE("every law is finite at tiny distances", "[passive]") {
-  // Waves set in with numbers whose squares vanish; with a stiffness of 0 too.
+  // Waves start with numbers whose squares underflow, and with a stiffness of 0, too.
   Random random(3);
   for (std::size_t i = 0; i < law_count; ++i) {
     with_law_type(static_cast<Law>(i), [&]<class Type>(Type) {
@@ -409,7 +408,7 @@ TEST_CASE("links without a stability proof are made passive, with a note", "[pas
     }
     return all;
   };
-  // c2 exerts nothing; c3 is soft, but nothing says how often it touches.
+  // c2 exerts no force; c3 is soft, but its number of contacts is unbounded.
   const Schemes usual = choose_schemes(network, {});
   const Scheme passive = discrete_gradient;
   CHECK(found(usual) == std::vector{plain, passive, plain, passive, passive, passive});
@@ -428,7 +427,7 @@ TEST_CASE("links without a stability proof are made passive, with a note", "[pas
         "played as published: 1 spring that bends, 1 bow, 2 contacts may gain energy. Use "
         "--budget passive=auto to prevent it");
   CHECK(!usual.hazard);
-  // Bows of two profiles, and springs of two laws, are told together.
+  // Bows of two profiles, and springs of two laws, share one note.
   const std::vector<std::string> notes =
       choose_schemes(
           network_of(text + "@b2 nlBow @in1 @m 0.2 0.01 1\n@q2 nlSpring2 @g @n 0. 3. 0.\n"), {})
@@ -436,7 +435,7 @@ TEST_CASE("links without a stability proof are made passive, with a note", "[pas
   REQUIRE(notes.size() == 3);
   CHECK(notes[0].starts_with("2 springs that bend made passive"));
   CHECK(notes[1].starts_with("2 bows made passive"));
-  // What is passive needs no proof any more, but for what a spring is at rest.
+  // Passive links need no proof, except for a spring's slope at rest.
   CHECK(without_passive(network, usual.links).links.size() == 3);
   // The kernel's runs never mix them.
   const Program program = make_program(network, 44100.0, true, usual.links);
@@ -448,7 +447,7 @@ TEST_CASE("links without a stability proof are made passive, with a note", "[pas
 }
 
 TEST_CASE("a passive law depends on no other lane", "[passive]") {
-  // Every law in packs as in single numbers, whatever is in the lanes beside it.
+  // Every law gives the same result in packs as in scalars, whatever the other lanes hold.
   using V = Pack<double, 16>;
   Random random(7);
   for (int i = 0; i < 3000; ++i) {
@@ -509,8 +508,8 @@ TEST_CASE("a bow's profile parameter reproduces both profiles bit for bit", "[pa
   }
 }
 
-// A finger that rests on a string at rest is on the very top of the hill, however steep: nothing
-// moves by itself. What is pushed ever so little goes down.
+// A finger at rest on a string at rest is at the top of the potential hill, however steep: nothing
+// moves by itself. The smallest push makes it slide down.
 TEST_CASE("a mass at rest on the top of a pluck stays there", "[passive]") {
   const std::string mass = "@g ground 0.\n@b mass 1. 0. 0.\n";
   for (const double k : {0.1, 1.0, 3.0, 1000.0}) {

@@ -1,4 +1,4 @@
-// What papers say of sounding networks, each case with its equation or figure.
+// Results of papers on sounding networks; each case names its equation or figure.
 #include <numbers>
 
 #include "core/laws/laws.h"
@@ -10,12 +10,12 @@ namespace {
 using namespace support;
 constexpr double pi = std::numbers::pi;
 
-// A ball that flies at a wall: mass 1, at -1 with the speed `v`; f = (K + Z v) D^P behind 0.
+// A ball of mass 1 that flies from -1 at a wall with speed `v`; f = (K + Z v) D^P beyond 0.
 struct Impact {
-  double out = 0.0;      // its speed when it is away again
-  double depth = 0.0;    // how deep it was
-  double samples = 0.0;  // how long it touched
-  double gain = 0.0;     // the most energy that it ever had, against that of before
+  double out = 0.0;      // Speed after the impact.
+  double depth = 0.0;    // Largest depth.
+  double samples = 0.0;  // Contact time.
+  double gain = 0.0;     // Largest energy, relative to the initial one.
 };
 
 Impact fly(double v, double k, double p, double z, Passivity passive = Passivity::always) {
@@ -36,7 +36,7 @@ Impact fly(double v, double k, double p, double z, Passivity passive = Passivity
     const double energy = .5 * ball.v[0] * ball.v[0] + .5 * (wall + before);
     impact.gain = std::max(impact.gain, energy / (.5 * v * v));
     impact.depth = std::max(impact.depth, x);
-    // The time inside, the samples of the crossings by their share.
+    // Counts samples inside, with fractions at the crossings.
     impact.samples += x > 0.0 && last > 0.0 ? 1.0
                       : x > 0.0             ? x / (x - last)
                       : last > 0.0          ? last / (last - x)
@@ -49,20 +49,20 @@ Impact fly(double v, double k, double p, double z, Passivity passive = Passivity
   return impact;
 }
 
-// A mass of 1 in a potential P made a square, psi^2/2, of a number psi of its own that follows its
-// slope: with g = psi'(x),
-//   x+ - 2 x + x- = -g (psi+ + psi-)/2,  psi+ - psi- = g (x+ - x-)/2,
+// A unit mass in a potential P quadratised as psi^2/2 with an auxiliary variable psi. With g =
+// psi'(x),
+//  x+ - 2 x + x- = -g (psi+ + psi-)/2,  psi+ - psi- = g (x+ - x-)/2,
 // which is linear in x+ and needs no iteration (Lopes, Helie and Falaize 2015; Ducceschi and Bilbao
-// 2019; Ducceschi, Bilbao, Willemsen and Serafin 2021). (x+ - x)^2/2 + psi+^2/2 is what it keeps.
+// 2019; Ducceschi, Bilbao, Willemsen and Serafin 2021). It conserves (x+ - x)^2/2 + psi+^2/2.
 struct Quadratised {
   double k = 0.0;
   double p = 1.0;
-  bool is_wall = false;  // only where x > 0; what psi has left beyond it is given back
+  bool is_wall = false;  // Acts only for x > 0; a rest of psi outside is given back.
   double x = 0.0;
   double v = 0.0;
   double psi = 0.0;
 
-  double of(double at) const {  // sqrt(2 P), P = k/(p + 1) |x|^(p + 1)
+  double of(double at) const {  // sqrt(2 P), P = k/(p + 1) |x|^(p + 1).
     return is_wall && at <= 0.0
                ? 0.0
                : std::sqrt(2.0 * k / (p + 1.0)) * std::pow(std::fabs(at), (p + 1.0) / 2.0);
@@ -71,7 +71,7 @@ struct Quadratised {
     return is_wall && at <= 0.0 ? 0.0 : std::copysign((p + 1.0) / 2.0 * of(at) / std::fabs(at), at);
   }
   void go() {
-    const double way = 2.0 * v;  // from the sample before, without any force
+    const double way = 2.0 * v;  // Displacement from the previous sample without any force.
     double g = x == 0.0 ? 0.0 : slope(x);
     if (is_wall && x <= 0.0 && way != 0.0) {
       g = -2.0 * psi / way;
@@ -87,13 +87,13 @@ struct Quadratised {
 }  // namespace
 
 TEST_CASE("a ball's contact time on a wall follows its power law", "[published]") {
-  // 1/2 v^2 = K/(P+1) D^(P+1), and 2 D/v times the integral of du/sqrt(1 - u^(P+1)) from 0 to 1: a
-  // half period for P = 1; 2.943275 D/v for P = 1.5 (Hertz 1882). Without losses it leaves as fast
-  // as it came, whatever the stiffness (Chatziioannou and van Walstijn 2015).
+  // 1/2 v^2 = K/(P+1) D^(P+1), and 2 D/v times the integral of du/sqrt(1 - u^(P+1)) from 0 to 1:
+  // half a period for P = 1; 2.943275 D/v for P = 1.5 (Hertz 1882). Without losses the speed is
+  // restored at any stiffness (Chatziioannou and van Walstijn 2015).
   for (const double p : {1.0, 1.5, 2.3}) {
     const double v = 1e-3;
     const double n = p + 1.0;
-    const double wanted = 300.0;  // samples
+    const double wanted = 300.0;  // Samples.
     const double integral = std::sqrt(pi) * std::tgamma(1.0 + 1.0 / n) / std::tgamma(.5 + 1.0 / n);
     const double depth = wanted * v / (2.0 * integral);
     const double k = .5 * v * v * n / std::pow(depth, n);
@@ -110,7 +110,7 @@ TEST_CASE("a ball's contact time on a wall follows its power law", "[published]"
 }
 
 TEST_CASE("no power-law contact gains energy at any stiffness", "[published]") {
-  // Bilbao, Torin and Chatziioannou 2015: the energy stays to rounding, from soft to rigid.
+  // Bilbao, Torin and Chatziioannou 2015: energy is conserved to rounding, from soft to rigid.
   for (const double p : {1.0, 1.3, 1.5, 2.3, 3.5}) {
     for (double k = 1e-3; k < 1e9; k *= 10.0) {
       for (const double v : {1e-5, 1e-2, 0.3}) {
@@ -121,13 +121,13 @@ TEST_CASE("no power-law contact gains energy at any stiffness", "[published]") {
       }
     }
   }
-  // The plain scheme does, so that this test can fail.
+  // The published scheme gains energy, so this test can fail.
   CHECK(fly(0.3, 1e4, 1.5, 0.0, Passivity::never).gain > 2.0);
 }
 
 TEST_CASE("a damped contact restores the energy of Hunt and Crossley's model", "[published]") {
-  // With L = Z/K the speeds in and out obey the same integral of v dv/(K +- Z v), whatever P
-  // (Hunt and Crossley 1975): v/L - ln(1 + L v)/L^2 in, -w/L - ln(1 - L w)/L^2 out.
+  // With L = Z/K the speeds in and out obey the same integral of v dv/(K +- Z v) for every P (Hunt
+  // and Crossley 1975): v/L - ln(1 + L v)/L^2 in, -w/L - ln(1 - L w)/L^2 out.
   for (const double p : {1.0, 1.5, 2.3}) {
     for (const double damped : {.05, .3, 1.0, 4.0}) {  // L v
       const double v = 1e-3;
@@ -149,9 +149,9 @@ TEST_CASE("a damped contact restores the energy of Hunt and Crossley's model", "
 }
 
 TEST_CASE("a string against a midpoint stop sounds a fourth higher", "[published]") {
-  // Half of the period it swings as a whole, which takes 1/2 T; then as two halves, each for a
-  // period of its own of 1/2 T / 2: 3/4 T in all (Cabannes 1984; Issanchou et al. 2017). On equal
-  // masses with K = M waves travel undispersed: T = 2 (N + 1) samples.
+  // For half of its period the string swings as a whole, which takes T/2; then as two halves for
+  // one period of their own, T/4: 3/4 T in all (Cabannes 1984; Issanchou et al. 2017). With equal
+  // masses and K = M waves have no dispersion: T = 2 (N + 1) samples.
   constexpr int masses = 199;
   constexpr int period = 2 * (masses + 1);
   std::string text = "@g ground 0.\n@w ground 0.\n";
@@ -162,7 +162,7 @@ TEST_CASE("a string against a midpoint stop sounds a fourth higher", "[published
             (i == 1 ? "@g" : "@m" + std::to_string(i - 1)) + " 1.\n";
   }
   text += "@e spring @m199 @g 1.\n@c contact @m100 @w 1000. 0.\n";
-  // The lower body is the string: it may not rise... so it starts above and the wall is below it.
+  // The string is the lower body of the contact, so it starts above the wall.
   text.replace(text.find("contact @m100 @w"), 16, "contact @w @m100");
   Stepper<double> string(text, Passivity::always);
   std::vector<double> heard;
@@ -170,7 +170,7 @@ TEST_CASE("a string against a midpoint stop sounds a fourth higher", "[published
     string.go();
     heard.push_back(string.x[49]);
   }
-  // The lag at which it is most like itself.
+  // Returns the lag of the largest autocorrelation.
   const auto likeness = [&](int lag) {
     double sum = 0.0;
     for (int n = 0; n < 6 * period; ++n) {
@@ -186,10 +186,9 @@ TEST_CASE("a string against a midpoint stop sounds a fourth higher", "[published
 }
 
 TEST_CASE("a bowed string shows Helmholtz motion", "[published]") {
-  // At a share b of its length it goes with the bow for 1 - b of its period and against it for b,
-  // once a period of 2 (N + 1) sqrt(M/K) samples (Helmholtz 1863;
-  // Desvages and Bilbao 2016). What is here of round corners, friction that gives way a little as
-  // it sticks, takes some of it away.
+  // At a share b of its length the string moves with the bow for 1 - b of the period and against it
+  // for b, with a period of 2 (N + 1) sqrt(M/K) samples (Helmholtz 1863; Desvages and Bilbao 2016).
+  // Rounded corners and creep during sticking reduce this a little.
   constexpr int masses = 119;
   const double period = 2.0 * (masses + 1) / std::sqrt(.8);
   for (const int place : {20, 24, 30}) {
@@ -230,11 +229,11 @@ TEST_CASE("a bowed string shows Helmholtz motion", "[published]") {
 
 TEST_CASE("the auxiliary-variable and discrete-gradient schemes agree for a ball on a wall",
           "[published]") {
-  // Ducceschi et al. 2021: without iteration the ball goes the same way but for an error of second
-  // order in the step, and leaves as fast as it came.
+  // Ducceschi et al. 2021: the non-iterative scheme follows the same path up to a second-order
+  // error and restores the speed.
   const double v = 1e-3;
   for (const double p : {1.3, 1.5, 2.3}) {
-    const double k = .5 * v * v * (p + 1.0) / std::pow(.05, p + 1.0);  // 0.05 deep
+    const double k = .5 * v * v * (p + 1.0) / std::pow(.05, p + 1.0);  // Depth 0.05.
     const auto depth_of = [&](int times, bool is_quadratised) {
       const double scale = times;
       const double stiffness = k / (scale * scale);
@@ -269,9 +268,9 @@ TEST_CASE("the auxiliary-variable and discrete-gradient schemes agree for a ball
 }
 
 TEST_CASE("the scalar auxiliary variable drifts from its potential", "[published]") {
-  // psi - sqrt(2 P(x)) of a hard spring, q x^3: nothing brings it back but a smaller step, its
-  // square (van Walstijn et al. 2024; Bilbao, Ducceschi and Zama 2023). It keeps its own energy to
-  // rounding and misses that of the spring; a discrete gradient has the spring's in its books.
+  // psi - sqrt(2 P(x)) of a hard spring q x^3: only a smaller step reduces the drift, quadratically
+  // (van Walstijn et al. 2024; Bilbao, Ducceschi and Zama 2023). The scheme conserves its own
+  // energy to rounding but not the spring's; a discrete gradient conserves the spring's.
   const double q = .4;
   const auto drift_of = [&](int times, double reach) {
     Quadratised spring{.k = q / (times * times), .p = 3.0, .x = reach};
@@ -308,9 +307,9 @@ TEST_CASE("the scalar auxiliary variable drifts from its potential", "[published
 }
 
 TEST_CASE("a bow's work equals the string's energy plus friction loss", "[published]") {
-  // Desvages and Bilbao 2016: the string's energy grows by f v_bow - f (v_bow - v), f being the
-  // friction at the mean of two samples' speeds: here over 40,000 samples in which it is bowed,
-  // faster and slower, and to and fro, of K/M = 0.8.
+  // Desvages and Bilbao 2016: the string's energy grows by f v_bow - f (v_bow - v), with f the
+  // friction at the mean speed of two samples: here over 40,000 samples of bowing with varying
+  // speed and direction at K/M = 0.8.
   for (const double strength : {.05, .5, 2.0, 20.0}) {
     constexpr double scale = 2.5e-3;
     const std::string text = scenes::string("s", 60, "0.8", "0.") +
@@ -346,7 +345,7 @@ TEST_CASE("a bow's work equals the string's energy plus friction loss", "[publis
     };
     double at = 0.0;
     double speed = 0.0;
-    double last = 0.0;  // speeds, of a sample before
+    double last = 0.0;  // Speeds of the previous sample.
     double last_hand = 0.0;
     double given = 0.0;
     double rubbed = 0.0;

@@ -1,11 +1,11 @@
-// Random nonlinear scenes as `play` plays them, judged by nothing but what is heard: every mass is
-// an output, and energy and work are added up from positions alone, by formulas of this file.
+// Random nonlinear scenes as `play` plays them. Every mass is an output, and energy and work are
+// computed from positions only, by the formulas of this file.
 //
-// What the linear part holds between two samples is 1/2 M d^2 - 1/4 Z (de)^2 + 1/2 K e[n] e[n+1],
-// with d and de the changes of a position and of an elongation; every other law adds what it stores
-// at both samples, halved. A force does F (x[n+1] - x[n-1])/2 of work, and a linear damper takes
-// Z ((e[n+1] - e[n-1])/2)^2. What contacts, bows and plucks rub off is not booked, so that the
-// balance may fall; it may never rise.
+// The linear part stores 1/2 M d^2 - 1/4 Z (de)^2 + 1/2 K e[n] e[n+1] between two samples, where d
+// and de are the changes of a position and of an elongation. Every other law adds half of its
+// potential at both samples. A force does the work F (x[n+1] - x[n-1])/2, and a linear damper
+// dissipates Z ((e[n+1] - e[n-1])/2)^2. The dissipation of contacts, bows and plucks is not
+// computed, so the balance may fall but never rise.
 #include <cstdlib>
 #include <cstring>
 
@@ -22,24 +22,24 @@ enum class Kind { spring, quadratic, cubic, clipped, contact, clipped_contact, b
 
 struct SceneMass {
   double m = 1.0;
-  double gravity = 0.0;  // a force towards -x
+  double gravity = 0.0;  // Force towards -x.
   double at = 0.0;
   double before = 0.0;
 };
 
-// Nodes are the masses, then the grounds, then the hand.
+// Nodes are the masses, then the grounds, then the driven input.
 struct SceneLink {
   Kind kind = Kind::spring;
   std::size_t a = 0;
   std::size_t b = 0;
-  std::array<double, 5> c{};  // as they are written
+  std::array<double, 5> c{};  // Arguments as written.
   std::size_t count = 0;
 };
 
 struct Push {
   std::size_t mass = 0;
   double force = 0.0;
-  std::size_t from = 0;  // samples
+  std::size_t from = 0;  // Samples.
   std::size_t until = 0;
 };
 
@@ -47,10 +47,10 @@ struct NonlinearScene {
   std::vector<SceneMass> masses;
   std::vector<double> grounds;
   std::vector<SceneLink> links;
-  std::vector<Push> pushes;  // an input each
-  bool has_hand = false;     // it holds one link to the last mass, which has only linear ones else
-  double hand_speed = 0.0;   // a sample
-  double hand_turn = 1.0;    // where it turns back
+  std::vector<Push> pushes;  // One input each.
+  bool has_hand = false;  // It has one link to the last mass, which otherwise has only linear ones.
+  double hand_speed = 0.0;  // Per sample.
+  double hand_turn = 1.0;   // Position where it turns back.
 
   std::size_t nodes() const { return masses.size() + grounds.size() + (has_hand ? 1 : 0); }
   double hand_at(std::size_t n) const {
@@ -70,7 +70,7 @@ std::string exactly(double value) {
   return text;
 }
 
-// --- what they store ----------------------------------------------------------------------------
+// --- stored energy -------------------------------------------------------------------------------
 
 double clipped_energy(double s, double c, double k, double d) {
   if (k < s || c == 0.0) {
@@ -79,12 +79,12 @@ double clipped_energy(double s, double c, double k, double d) {
   if (s >= k) {
     return .5 * k * d * d;
   }
-  const double edge = (k - s) / c;  // squared
+  const double edge = (k - s) / c;  // Squared.
   const auto within = [&](double square) { return .5 * s * square + .25 * c * square * square; };
   return d * d <= edge ? within(d * d) : within(edge) + .5 * k * (d * d - edge);
 }
 
-// Of what is not linear, between a sample at which it is stretched by e and the next.
+// Energy of the nonlinear part between a sample with elongation e and the next.
 double stored(const SceneLink& link, double e, double next) {
   const auto& c = link.c;
   const auto mean = [&](auto&& energy) { return .5 * (energy(e) + energy(next)); };
@@ -117,7 +117,7 @@ double stored(const SceneLink& link, double e, double next) {
   return 0.0;
 }
 
-// K and Z of what is linear in it.
+// K and Z of the linear part.
 std::array<double, 2> linear_of(const SceneLink& link) {
   switch (link.kind) {
     case Kind::spring:
@@ -135,13 +135,13 @@ std::array<double, 2> linear_of(const SceneLink& link) {
   return {0.0, 0.0};
 }
 
-// --- what is drawn ------------------------------------------------------------------------------
+// --- random scenes -------------------------------------------------------------------------------
 
 SceneLink random_link(Random& random, Kind kind, std::size_t a, std::size_t b, double e, double m) {
   SceneLink link{.kind = kind, .a = a, .b = b};
   const auto any = [&](double least, double most) { return m * of_any_size(random, least, most); };
   const double z = random.below(2) == 0 ? 0.0 : any(1e-4, 2.0);
-  // At its very edge as it starts, every third time.
+  // Every third link starts exactly at its edge.
   const double reach = random.below(3) == 0 ? -e : random.uniform(-.1, .1);
   const double k = any(1e-3, 1e6);
   switch (kind) {
@@ -186,8 +186,8 @@ Kind any_kind(Random& random) {
   return kinds[random.below(std::size(kinds))];
 }
 
-// 1 to 40 masses on linear springs that are stable, and 1 to 200 other links between any of them
-// and two grounds, in parallel too.
+// 1 to 40 masses on stable linear springs, and 1 to 200 other links between any of them and two
+// grounds, including parallel ones.
 NonlinearScene random_scene(std::uint64_t seed) {
   Random random(seed);
   NonlinearScene scene;
@@ -207,7 +207,7 @@ NonlinearScene random_scene(std::uint64_t seed) {
   const auto place_of = [&](std::size_t node) {
     return node < masses ? scene.masses[node].at : scene.grounds[node - masses];
   };
-  // Each mass on one spring, to a ground or to one before it, as some are free.
+  // Each mass has one spring, to a ground or to an earlier mass, so some parts are free.
   for (std::size_t i = 0; i < masses; ++i) {
     const std::size_t other = i == 0 || random.below(2) == 0 ? masses : random.below(i);
     if (random.below(5) > 0) {
@@ -291,9 +291,9 @@ std::string text_of(const NonlinearScene& scene) {
   return text;
 }
 
-// --- the judge ----------------------------------------------------------------------------------
+// --- energy balance ------------------------------------------------------------------------------
 
-// Positions of all nodes, three samples of them, and what is booked.
+// Positions of all nodes in three samples, and the balance.
 class EnergyJudge {
  public:
   explicit EnergyJudge(const NonlinearScene& scene) : scene_(scene) {
@@ -311,7 +311,7 @@ class EnergyJudge {
     passed_ = std::fabs(energy_);
   }
 
-  // Sample n + 1, and what pushes it there.
+  // Takes sample n + 1 and the forces that lead to it.
   void hear(const std::vector<double>& positions, std::size_t n) {
     std::vector<double>& next = x_[2];
     next = x_[1];
@@ -333,8 +333,8 @@ class EnergyJudge {
     for (const Push& push : scene_.pushes) {
       if (n >= push.from && n < push.until) {
         put_in(push.force, push.mass);
-        // What is held against a force is pushed back from where that alone would bring it: so
-        // finely its place can be known.
+        // A mass held against a force is pushed back from where the force alone would bring it,
+        // which limits the precision of its position.
         const double free = push.force / scene_.masses[push.mass].m;
         worked_noise_ += 4e-16 * std::fabs(push.force * free);
       }
@@ -349,7 +349,7 @@ class EnergyJudge {
       const double change = half_way(link.a) - half_way(link.b);
       const auto [k, z] = linear_of(link);
       work -= z * change * change;
-      // As published, linear links exert nothing in the first sample: as if something held them.
+      // In the published scheme linear links exert no force in the first sample, as if held.
       work +=
           n > 0 ? 0.0 : (k * stretch(1, link) + z * (stretch(1, link) - stretch(0, link))) * change;
     }
@@ -357,8 +357,7 @@ class EnergyJudge {
     balance_ += work;
     const double now = energy();
     if (n == 0) {
-      // A text says where everything starts and where it was a sample before; both are taken for
-      // given, whichever holds more.
+      // The initial energy is that of the start or one sample earlier, whichever is larger.
       start_ = std::max(start_ + balance_, now);
       balance_ = 0.0;
     }
@@ -371,7 +370,7 @@ class EnergyJudge {
     is_finite = is_finite && std::isfinite(now);
   }
 
-  double excess = 0.0;  // the most that there was beyond what was put in, of all that went through
+  double excess = 0.0;  // Largest surplus, relative to the energy that passed through.
   double farthest = 0.0;
   bool is_finite = true;
 
@@ -380,13 +379,13 @@ class EnergyJudge {
     return x_[sample][link.a] - x_[sample][link.b];
   }
 
-  // Between the first two samples.
+  // Energy between the first two samples.
   double energy() const {
     double sum = 0.0;
     each_term([&](double value, auto&&, double) { sum += value; });
     return sum;
   }
-  // What rounding of the positions may make of it.
+  // Error of the energy from rounding of the positions.
   double noise() const {
     double sum = 0.0;
     each_term([&](double value, auto&& slope, double size) {
@@ -394,7 +393,7 @@ class EnergyJudge {
     });
     return sum;
   }
-  // Of each term its value, what gives its slope, and how far from 0 what it depends on is.
+  // Calls `use` for each term with its value, its slope, and the distance of its argument from 0.
   template <class Use>
   void each_term(Use&& use) const {
     for (std::size_t i = 0; i < scene_.masses.size(); ++i) {
@@ -423,7 +422,8 @@ class EnergyJudge {
     }
   }
 
-  // What the hand's link pulls the last mass with: what its motion needs beyond all else.
+  // Force of the driven input's link on the last mass: the part of its acceleration that nothing
+  // else explains.
   double felt(std::size_t n) const {
     const std::size_t mass = scene_.masses.size() - 1;
     const SceneMass& body = scene_.masses[mass];
@@ -445,10 +445,10 @@ class EnergyJudge {
   }
 
   const NonlinearScene& scene_;
-  std::array<std::vector<double>, 3> x_;  // the last sample but one, the last, the next
+  std::array<std::vector<double>, 3> x_;  // The last sample but one, the last, the next.
   double energy_ = 0.0;
   double start_ = 0.0;
-  double balance_ = 0.0;  // work put in, less what linear dampers took
+  double balance_ = 0.0;  // Work put in, minus the dissipation of linear dampers.
   double passed_ = 0.0;
   double worked_noise_ = 0.0;
 };
@@ -456,17 +456,17 @@ class EnergyJudge {
 struct Outcome {
   double excess = 0.0;
   bool is_finite = true;
-  bool is_lost = false;  // it fell silent, though it was not thrown out of sight
+  bool is_lost = false;  // The voice fell silent without having been thrown out of range.
 };
 
-constexpr double far_away = 1e8;  // beyond ten times this no voice is followed
+constexpr double far_away = 1e8;  // Voices are not followed beyond ten times this.
 
 Outcome play(const NonlinearScene& scene, Passivity passive, std::size_t frames) {
   const std::string text = text_of(scene);
   Player player(text, default_preset(network_of(text), true),
                 {.bare = true, .budget = Budget{.passive = passive}});
   EnergyJudge judge(scene);
-  const DenormalsFlushed flushed;  // as while anything plays
+  const DenormalsFlushed flushed;  // As during playing.
   constexpr std::size_t block = 256;
   const std::size_t inputs = scene.pushes.size() + 1;
   std::vector<std::vector<double>> in(inputs, std::vector<double>(block));
@@ -504,7 +504,7 @@ TEST_CASE("no scene gains energy as played", "[scenes]") {
   unsigned long long seed = 1;
   unsigned long long count = 150;
   unsigned long long frames = 1024;
-  unsigned long long most_links = 1000;  // scenes of more are passed over
+  unsigned long long most_links = 1000;  // Scenes with more links are skipped.
   if (asked != nullptr) {
     std::sscanf(asked, "%llu,%llu,%llu,%llu", &seed, &count, &frames, &most_links);
   }
@@ -534,8 +534,8 @@ TEST_CASE("no scene gains energy as played", "[scenes]") {
 }
 
 TEST_CASE("scenes that once gained energy or fell silent stay fixed", "[scenes]") {
-  // Of 40,000. A force of 1e5 that meets a cubic spring of K/M = 1e6; a pluck of 1e6 whose edge a
-  // mass comes to rest at; 181 bows on one mass.
+  // Seeds out of 40,000: a force of 1e5 on a cubic spring of K/M = 1e6; a pluck of 1e6 at whose
+  // edge a mass comes to rest; 181 bows on one mass.
   for (const std::uint64_t seed :
        {269, 14880, 17910, 21096, 24147, 28608, 40866, 41933, 45108, 56846, 58139}) {
     CAPTURE(seed);

@@ -1,6 +1,6 @@
-// What silence= leaves out is below the peak of the unreduced output by as many decibels as it
-// says, over its whole life: blows at inputs, and starts as they are played. Each network beside
-// itself with all of its modes.
+// Modes omitted by silence= stay below the peak of the full output by the stated decibels, at all
+// times, for strikes at inputs and for initial states. Each network is compared with all of its
+// modes.
 #include <cstdio>
 
 #include "tests/support/player.h"
@@ -13,7 +13,7 @@ using support::Player;
 using support::Random;
 using support::show;
 
-// A string or a mesh, held and heard at places of it and at masses, with dampers in proportion.
+// A string or mesh, held and heard at places and at masses, with proportional dampers.
 std::string network(std::uint64_t seed) {
   Random random(seed);
   const auto number = [&](double low, double high) { return show(random.uniform(low, high)); };
@@ -24,7 +24,7 @@ std::string network(std::uint64_t seed) {
   const bool is_mesh = random.below(2) == 0;
   const auto rows = 5 + random.below(6);
   const auto columns = is_mesh ? 5 + random.below(6) : 20 + random.below(60);
-  const bool is_written = seed % 2 == 1;  // mass by mass, else a macro held at places
+  const bool is_written = seed % 2 == 1;  // Written mass by mass, else as a macro held at places.
   if (is_written) {
     text += is_mesh ? scenes::square_mesh("s", static_cast<int>(rows), static_cast<int>(columns),
                                           show(k), show(z))
@@ -54,13 +54,13 @@ std::string network(std::uint64_t seed) {
 }
 
 struct Tally {
-  std::size_t reduced = 0;  // networks in which anything slept
-  double tightest = 0.0;    // error per bound
-  double awake = 0.0;       // share of modes that were, where there are modes
+  std::size_t reduced = 0;  // Networks with sleeping modes.
+  double tightest = 0.0;    // Ratio of error to bound.
+  double awake = 0.0;       // Share of awake modes.
   std::size_t with_modes = 0;
 };
 
-// The largest error of any output against its own peak.
+// The largest error of any output, relative to its peak.
 void measure(std::uint64_t seed, double silence_db, Tally& tally) {
   const std::string text = network(seed);
   const auto play = [&](double db) {

@@ -1,5 +1,5 @@
 // Plucks, bows and hard contacts where the published scheme fails, against fine references; and
-// every kernel that takes such links against the direct one.
+// every kernel with such links against the direct one.
 #include <functional>
 
 #include "core/kernels/chains/chains_form.h"
@@ -12,7 +12,8 @@ namespace {
 
 using namespace support;
 
-// x'' = a(t, x, x'), by steps of 1/fineness samples; `use` sees every one until it returns false.
+// Integrates x'' = a(t, x, x') by Runge-Kutta in steps of 1/fineness samples; calls `use` for each
+// until it returns false.
 template <class Acceleration, class Use>
 void runge_kutta(int fineness, Acceleration&& a, Use&& use) {
   const double h = 1.0 / fineness;
@@ -44,7 +45,7 @@ bool has_passed(double d, bool& has_touched) {
   return has_touched && d > 1.5 * pluck_scale;
 }
 
-// The oscillator's amplitude, in scales, when the finger has passed it, or has come to its end.
+// The oscillator's amplitude, in scales, after the finger has passed or reached its end.
 double plucked_finely(double k, double speed) {
   const int fineness = k > 5.0 ? 1000 : 200;
   double amplitude = 0.0;
@@ -81,16 +82,16 @@ double plucked(double k, double speed, Passivity passive) {
 // --- S15 -----------------------------------------------------------------------------------------
 
 struct Sound {
-  double rms = 0.0;     // of the speed
-  double period = 0.0;  // samples
+  double rms = 0.0;     // Relative to the bow speed.
+  double period = 0.0;  // Samples.
 };
 
-// What an oscillator does under a bow from 20000 samples on, in whole periods of as many more;
-// `next` gives x and x'.
+// Measures a bowed oscillator from sample 20000, over whole periods of about as many samples;
+// `next` returns x and x'.
 Sound listen(int fineness, const std::function<std::pair<double, double>()>& next) {
   constexpr int start = 20000;
   std::vector<double> x;
-  std::vector<double> energy = {0.0};  // of the speed, up to each sample
+  std::vector<double> energy = {0.0};  // Cumulative squared speed.
   double mean = 0.0;
   for (int n = 0; n < 2 * start * fineness; ++n) {
     const auto [here, speed] = next();
@@ -136,7 +137,7 @@ Sound bowed_finely(double z, double shape = 0.) {
   return listen(fineness, [&] { return states[i++]; });
 }
 
-// In so many steps a sample.
+// With this many steps per sample.
 Sound bowed(double z, Passivity passive, int steps = 1, double shape = 0.) {
   const Network network =
       network_of("@in1 posInput 0.\n@o osc 1. 0.01 0.0005 0. 0.\n@b nlBow @in1 @o " + show(z) +
@@ -154,8 +155,8 @@ Sound bowed(double z, Passivity passive, int steps = 1, double shape = 0.) {
 
 // --- S16 -----------------------------------------------------------------------------------------
 
-// The seed's bowed string: 150 masses, K = .1, Z = .001, bowed at 133 with .08 and 5e-5 at 2e-5 a
-// sample; heard at 10, from the second second on for two, at so many times the rate.
+// The bowed string of the reference: 150 masses, K = .1, Z = .001, bowed at 133 with .08 and 5e-5
+// at 2e-5 per sample; heard at 10, from the second second on for two, at `times` the rate.
 std::vector<double> bowed_string(int times, Passivity passive) {
   const Network network = network_of(scenes::string("low", 150, "0.1", "0.001") +
                                      "@in1 posInput 0.\n@bow nlBow @in1 @low_m133 0.08 0.00005\n" +
@@ -186,7 +187,7 @@ double rms(const std::vector<double>& y) {
   return std::sqrt(sum / static_cast<double>(y.size()));
 }
 
-// Where it is most like itself, over ten periods, about `guess` samples each.
+// Period from the autocorrelation over ten periods of about `guess` samples.
 double period_of(const std::vector<double>& y, double guess) {
   const auto likeness = [&](std::size_t lag) {
     double sum = 0.0;
@@ -212,13 +213,13 @@ double period_of(const std::vector<double>& y, double guess) {
 
 constexpr std::uint32_t string_masses = 50;
 
-// A string over a wall of stiffness K that its 21st mass beats against.
+// A string over a wall of stiffness K that its 21st mass hits.
 std::string string_over_wall(const std::string& k) {
   return scenes::string("s", string_masses, "0.1", "0.0005") +
          "@w ground -0.02\n@hit contact @w @s_m20 " + k + " 0.\n" + scenes::output(1, "s_m36");
 }
 
-// Drawn to .3 at three tenths of its length.
+// Displaced to .3 at three tenths of its length.
 std::vector<double> drawn(const Program& program) {
   std::vector<double> x = program.position;
   for (std::uint32_t i = 0; i < string_masses; ++i) {
@@ -228,7 +229,7 @@ std::vector<double> drawn(const Program& program) {
   return x;
 }
 
-// Of 1.2's theorem: (d'(M - Z/2) d + x' K before)/2, and what is in the wall.
+// The conserved energy (d'(M - Z/2) d + x' K before)/2, plus that of the wall.
 double string_energy(const std::vector<double>& x, const std::vector<double>& v, double k) {
   double energy = 0.0;
   const auto wall = [=](double depth) { return depth > 0.0 ? k / 2.0 * depth * depth : 0.0; };
@@ -264,26 +265,27 @@ std::vector<double> struck_string(Program program, double k, int frames, Spread*
 }  // namespace
 
 TEST_CASE("S14, T14: a pluck releases at the correct point, to one step", "[stress_contacts]") {
-  // Reference: Runge-Kutta at 200 to 1000 steps a sample.
+  // Reference: Runge-Kutta with 200 to 1000 steps per sample.
   for (const double k : {.05, .5, 5., 40., 400.}) {
     for (const double speed : {1e-4, 1e-3, 5e-3, 1e-2}) {
       const double reference = plucked_finely(k, speed);
       const double found = plucked(k, speed, Passivity::always);
       CAPTURE(k, speed, reference, found);
-      // One step a sample, of second order: a finger that is over the hill in 20 samples or more is
-      // right to some per cent, one that takes two samples to a third. It never gains anything.
+      // One step per sample, of second order: a finger that takes 20 samples or more across the
+      // hill is accurate to a few per cent, one that takes two samples to a third. It never gains
+      // energy.
       CHECK(found == Approx(reference).epsilon(speed > 5e-3 ? .37 : .08));
     }
   }
-  // A finger that takes thousands of samples: on a hard one's flank the mass rings at more than
-  // once a sample, while what else pulls it is known once a sample.
+  // A finger that takes thousands of samples: on a hard finger's flank the mass oscillates faster
+  // than once per sample, while other forces are known once per sample.
   for (const double k : {.05, .5, 5., 40., 400.}) {
     const double reference = plucked_finely(k, 1e-5);
     const double found = plucked(k, 1e-5, Passivity::always);
     CAPTURE(k, reference, found);
     CHECK(found == Approx(reference).epsilon(k > 40.0 ? .055 : k > 5.0 ? .015 : .01));
   }
-  // As published it is right while it is soft and slow, tunnels, and explodes.
+  // The published scheme is accurate while soft and slow, then tunnels, then diverges.
   CHECK(plucked(.5, 1e-3, Passivity::never) == Approx(plucked_finely(.5, 1e-3)).epsilon(.005));
   CHECK(plucked(.5, 1e-2, Passivity::never) < 1e-9);
   CHECK(plucked(40., 1e-4, Passivity::never) > 2.0 * plucked_finely(40., 1e-4));
@@ -291,9 +293,9 @@ TEST_CASE("S14, T14: a pluck releases at the correct point, to one step", "[stre
 }
 
 TEST_CASE("S15, T15: a strong bow sticks as it should", "[stress_contacts]") {
-  // Reference: Runge-Kutta at 50 steps a sample, as tabled. Above Z = 3 M there are several speeds
-  // at which friction and inertia agree; one sample cannot tell when such a bow lets go, and it
-  // lets go too early, without gaining anything: bows that hard need a higher rate.
+  // Reference: Runge-Kutta with 50 steps per sample, tabulated. Above Z = 3 M friction and inertia
+  // agree at several speeds. One sample cannot decide when such a bow slips, and it slips too
+  // early, without gaining energy: such bows need a higher rate.
   struct Row {
     double z;
     double rms;
@@ -325,7 +327,7 @@ TEST_CASE("S15, T15: a strong bow sticks as it should", "[stress_contacts]") {
 }
 
 TEST_CASE("S15: a bow of any strength sticks with steps of Z below 3 M", "[stress_contacts]") {
-  // Reference: Runge-Kutta at 50 steps a sample. Z per step is Z over the number of steps.
+  // Reference: Runge-Kutta with 50 steps per sample. Z per step is Z over the number of steps.
   struct Row {
     double z;
     int steps;
@@ -338,7 +340,7 @@ TEST_CASE("S15: a bow of any strength sticks with steps of Z below 3 M", "[stres
       CAPTURE(shape, z, steps, reference.rms, reference.period, found.rms, found.period);
       CHECK(found.rms == Approx(reference.rms).epsilon(.003));
       CHECK(found.period == Approx(reference.period).epsilon(.003));
-      // A step short of that it lets go before its time.
+      // With half the steps it slips too early.
       if (steps > 1) {
         const Sound early = bowed(z, Passivity::always, steps / 2, shape);
         CHECK(early.period < .9 * reference.period);
@@ -349,7 +351,7 @@ TEST_CASE("S15: a bow of any strength sticks with steps of Z below 3 M", "[stres
 
 TEST_CASE("S16, T15: the seed's bowed string sounds the same by the discrete gradient",
           "[stress_contacts]") {
-  // Reference: sixteen times the rate. As published it is as good: a weak bow is left alone.
+  // Reference: sixteen times the rate. The published scheme is as good, so a weak bow uses it.
   const std::vector<double> fine = bowed_string(16, Passivity::always);
   const double period = period_of(fine, 44100.0 / 23.068);
   CHECK(44100.0 / period == Approx(23.068).epsilon(5e-4));
@@ -362,7 +364,7 @@ TEST_CASE("S16, T15: the seed's bowed string sounds the same by the discrete gra
 }
 
 TEST_CASE("S24: a string beats against a hard wall", "[stress_contacts]") {
-  // Reference: the same at 64 times the rate, for the first 5 ms; after that the energy alone.
+  // Reference: the same at 64 times the rate, for the first 5 ms; after that only the energy.
   constexpr int times = 64;
   constexpr int early = 220;
   for (const double k : {.5, 2., 10., 100.}) {
@@ -393,7 +395,8 @@ TEST_CASE("S24: a string beats against a hard wall", "[stress_contacts]") {
 }
 
 TEST_CASE("chains and grids step passive links as the direct kernel does", "[stress_contacts]") {
-  // A string with walls, a limiter, a bow and a pluck, two of them on one mass, a hand that moves.
+  // A string with walls, a limiter, a bow and a pluck, two of them on one mass, and a moving
+  // position input.
   const std::string text =
       scenes::string("s", 60, "0.1", "0.0005") +
       "@w ground -0.02\n@in1 posInput 0.\n@l mass 0.5 0.03 0.03\n@g spring @w @l 0.02\n"
@@ -406,7 +409,7 @@ TEST_CASE("chains and grids step passive links as the direct kernel does", "[str
   const auto play = [](Program program, Isa isa, auto number) {
     Bare<decltype(number)> bare(std::move(program), 1, isa);
     std::vector<double> heard;
-    for (int n = 0; n < 800; ++n) {  // a while before it is chaotic
+    for (int n = 0; n < 800; ++n) {  // Before it becomes chaotic.
       const std::vector<double> out = bare.step({.05 * std::sin(.01 * n)});
       heard.insert(heard.end(), out.begin(), out.end());
     }

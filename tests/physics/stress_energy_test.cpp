@@ -1,5 +1,5 @@
-// Where the published scheme fails, and by how much: its own figures, so that what mends it has
-// something to be measured against. And what is physics, so that nobody mends that.
+// Quantifies where the published scheme fails, as a baseline for the corrected schemes. Also lists
+// effects that are physical and must stay.
 #include <functional>
 #include <numbers>
 
@@ -11,7 +11,7 @@ namespace {
 
 using support::show;
 
-// One voice of the published scheme, placed by hand.
+// One voice of the published scheme with a state set by the test.
 class Lab {
  public:
   explicit Lab(const std::string& text)
@@ -57,7 +57,7 @@ std::string oscillator(double k, double z) {
   return "@m osc 1. " + show(k) + " " + show(z) + " 0. 0.\n@out1 posOutput @m\n";
 }
 
-std::string digits(double value) {  // all of them
+std::string digits(double value) {  // Prints all digits.
   char text[40];
   std::snprintf(text, sizeof text, "%.17g", value);
   return text;
@@ -78,7 +78,7 @@ TEST_CASE("S01: an oscillator at the edge of stability", "[stress_energy]") {
             " 0. 0.\n@out1 posOutput @m\n");
     lab.set_state({1.0}, {0.0});
     double most = 1.0;
-    double growth = 0.0;  // per sample, over the second half
+    double growth = 0.0;  // Per sample, over the second half.
     for (int n = 1; n <= 44100; ++n) {
       lab.step();
       most = std::max(most, std::fabs(lab.x[0]));
@@ -97,7 +97,7 @@ TEST_CASE("S01: an oscillator at the edge of stability", "[stress_energy]") {
       const double root = z == 0.0 ? 1.000500125e-3 : 9.90292e-5;  // |z| - 1
       CHECK(growth == Approx(std::log1p(root)).epsilon(z == 0.0 ? 1e-6 : 3e-2));
     }
-    // The meter knows: where it can be negative nothing holds the amplitude.
+    // The energy meter shows it: where the energy can be negative, the amplitude is unbounded.
     lab.set_state({-1.0}, {-2.0});
     CHECK((lab.energy() < 0.0) == (beyond > 0.0));
   }
@@ -139,7 +139,7 @@ TEST_CASE("S04: a damper against the ground", "[stress_energy]") {
       lab.step();
       CAPTURE(z, n);
       CHECK(lab.v[0] == Approx(std::pow(1.0 - z, n)).epsilon(1e-12).margin(1e-15));
-      CHECK(lab.energy() <= before);  // below 0 and falling where it grows
+      CHECK(lab.energy() <= before);  // Negative and falling where it grows.
     }
     CHECK((z < 2.0) == (lab.energy() > -1e-300 && std::fabs(lab.v[0]) < 1.0));
     if (z < 2.0) {
@@ -166,7 +166,7 @@ TEST_CASE("S12: a jump of stiffness adds the energy of the scheme's formula", "[
     for (int n = 0; n < 1000; ++n) {
       lab.step();
     }
-    CHECK(lab.energy() / before == Approx(ratio).epsilon(1e-10));  // and nothing later
+    CHECK(lab.energy() / before == Approx(ratio).epsilon(1e-10));  // Constant afterwards.
     return ratio;
   };
   double formula = 0.0;
@@ -224,7 +224,7 @@ TEST_CASE("S21: a jump of a position input strikes through its damper", "[stress
   lab.step({0.0});
   lab.step({1.0});
   lab.step({1.0});
-  CHECK(lab.v[0] == Approx(0.1 + 0.5).epsilon(1e-12));  // K + Z of the step: Z/M is the blow
+  CHECK(lab.v[0] == Approx(0.1 + 0.5).epsilon(1e-12));  // K + Z of the step: Z/M is the strike.
   double most = 0.0;
   for (int n = 0; n < 100; ++n) {
     lab.step({1.0});
@@ -260,7 +260,7 @@ TEST_CASE("S23: a stiffness modulated at twice the pitch causes parametric growt
 }
 
 TEST_CASE("S10: a ball on a published contact gains energy without limit", "[stress_energy]") {
-  // By how much is chaotic: another order of the same sums gives 147 or 788 where this gives 388.
+  // The gain is chaotic: another order of summation gives 147 or 788 instead of 388.
   struct Row {
     double k, least;
   };

@@ -1,6 +1,6 @@
-// The linear cases that are meant to break a network, each beside the plain scheme that does break:
-// around the limits of theory, a mass that grows light, unequal masses, and garbage of all kinds.
-// T1 and the figures of most limits are in stability_test.
+// Linear cases at the limits of stability, each beside the plain scheme, which diverges: a
+// shrinking mass, unequal masses, and invalid input of all kinds. stability_test has T1 and most
+// limits.
 #include "app/realtime/process.h"
 #include "core/analysis/stability.h"
 #include "tests/support/player.h"
@@ -13,7 +13,7 @@ using namespace support;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// How large a network gets that was kicked, with one parameter at a value: the plain scheme alone.
+// Growth of a network after an impulse, with one parameter at a value, in the plain scheme.
 double growth(const std::string& text, const std::string& name, double value, int steps) {
   const Network network = network_of(text);
   Program program = make_program(network, 44100.0, true);
@@ -56,7 +56,7 @@ std::string with_masses(std::string text) {
   return "@m_M param 1.\n" + text;
 }
 
-// Up to the limit it stays bounded; beyond it by a ten-thousandth it does not.
+// The network stays bounded up to the limit, and diverges 1e-4 beyond it.
 void check_around(const std::string& text, const std::string& name, double limit, bool is_upper,
                   int steps) {
   const SafeRange range = range_of(text, name);
@@ -124,7 +124,7 @@ TEST_CASE("S22: a light mass on a heavy one is stable up to its limit", "[stress
   CHECK(range_of(text, "k").highest == Approx(limit).epsilon(1e-9));
   CHECK(growth(text, "k", 0.00399, 100000) < 1e4);
   CHECK(growth(text, "k", 0.004, 100000) > 1e10);
-  // Row by row it would have been twice too careful: k (1/.001 + 1/.001) < 4.
+  // A row-wise bound would be half as large: k (1/.001 + 1/.001) < 4.
   const auto verdict = [&](double k) {
     const Network network = network_of(text);
     const auto compiled = compile_network(network, default_preset(network, true),
@@ -137,7 +137,7 @@ TEST_CASE("S22: a light mass on a heavy one is stable up to its limit", "[stress
   CHECK(verdict(limit * (1.0 + 1e-6)) == Verdict::unstable);
 }
 
-// --- S25: garbage -------------------------------------------------------------------------------
+// --- S25: invalid input --------------------------------------------------------------------------
 
 TEST_CASE("S25: invalid models give an error or silence, never NaN", "[stress_linear]") {
   const auto complaints = [](const std::string& text) {
@@ -160,17 +160,17 @@ TEST_CASE("S25: invalid models give an error or silence, never NaN", "[stress_li
   has(complaints("@a mass 1. 0. 0.\n"), "output");
   has(complaints("@a mass 1. 0. [1/0]\n"), "error");
 
-  // What is let in sounds of numbers only, whatever is done to it.
+  // Accepted models give finite output under any input.
   const std::string heard = "@in1 frcInput @a\n" + scenes::output(1, "a");
   for (const std::string& text :
-       {"@M param 0.\n@g ground 0.\n@a mass M 0. 0.\n@r spring @g @a 0.1\n" + heard,  // no mass
-        pair + "@r spring @g @a -0.1\n" + heard,                                      // K < 0
-        pair + "@r damper @g @a -0.1\n" + heard,                                      // Z < 0
-        pair + "@r spring @a @a 0.1\n" + heard,                                       // to itself
-        pair + "@r spring @a @b 0.1\n@s spring @a @b 0.1\n" + heard,                  // twice
-        "@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n@r spring @a @b 0.1\n" + heard,          // no ground
-        "@a mass 1. 0. 0.\n" + heard,                                                 // no link
-        "@g ground 0.\n" + scenes::output(1, "g")}) {                                 // no mass
+       {"@M param 0.\n@g ground 0.\n@a mass M 0. 0.\n@r spring @g @a 0.1\n" + heard,  // Mass 0.
+        pair + "@r spring @g @a -0.1\n" + heard,                                      // Negative K.
+        pair + "@r damper @g @a -0.1\n" + heard,                                      // Negative Z.
+        pair + "@r spring @a @a 0.1\n" + heard,                               // A link to itself.
+        pair + "@r spring @a @b 0.1\n@s spring @a @b 0.1\n" + heard,          // A duplicate link.
+        "@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n@r spring @a @b 0.1\n" + heard,  // No ground.
+        "@a mass 1. 0. 0.\n" + heard,                                         // No link.
+        "@g ground 0.\n" + scenes::output(1, "g")}) {                         // No mass.
     INFO(text);
     auto compiled = compile_network(network_of(text), default_preset(network_of(text), false), {});
     if (!compiled) {
@@ -193,7 +193,7 @@ TEST_CASE("S25: invalid models give an error or silence, never NaN", "[stress_li
 }
 
 TEST_CASE("S25: a parameter is kept from values that make an argument NaN", "[stress_linear]") {
-  // 1/p, and a mass that may vanish: the ranges stop before.
+  // 1/p, and a mass that may vanish: the ranges end before that.
   for (const std::string& text :
        {"@p param 0.5\n@o osc 1. 0.1/p 0. 0. 0.\n@in1 frcInput @o\n" + scenes::output(1, "o"),
         "@p param 0.5\n@o osc p 0.1 0. 0. 0.\n@in1 frcInput @o\n" + scenes::output(1, "o")}) {
@@ -232,7 +232,7 @@ TEST_CASE("S25: events with NaN are ignored", "[stress_linear]") {
   for (std::size_t n = 0; n < alone.y().size(); ++n) {
     error.add(alone.y()[n], player.y()[n]);
   }
-  CHECK(error.relative() < 1e-12);  // a block that is cut is added up in another order
+  CHECK(error.relative() < 1e-12);  // A divided block is summed in another order.
 }
 
 TEST_CASE("S25: NaN input samples are silent, and later samples are heard", "[stress_linear]") {
@@ -297,7 +297,7 @@ TEST_CASE("S25: a force input accepts any level, and its sound decays", "[stress
       player.run(force.size(), {}, {256}, std::span(&input, 1));
       const std::span<const double> y = player.y();
       REQUIRE(std::ranges::all_of(y, [](double sample) { return std::isfinite(sample); }));
-      // By how fast it moves, as contacts push it aside; a tenth is for swings of few samples.
+      // Measured by speed, because contacts displace it; a tenth allows for periods of few samples.
       const double soon = support::largest_step(y.subspan(second, second / 2));
       CHECK(support::largest_step(y.subspan(5 * second / 2)) <= 1.1 * soon);
       if (loudness <= 1e6) {

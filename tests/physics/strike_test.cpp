@@ -1,5 +1,5 @@
-// A mass that is struck by its name: what a force input on it would do, in every kernel, whether or
-// not the model has such an input.
+// Striking a mass by name equals a force input on it, in every kernel, whether or not the model has
+// such an input.
 #include <set>
 
 #include "tests/support/networks/random_network.h"
@@ -14,7 +14,7 @@ constexpr std::size_t frames = 4410;
 constexpr std::uint32_t blow_frame = 1000;
 constexpr double force = 0.01;
 
-// The greatest difference, of the greatest value that `expected` has.
+// The largest difference, relative to the largest expected value.
 double difference(const std::vector<std::vector<double>>& expected,
                   const std::vector<std::vector<double>>& found) {
   double most = 0.0;
@@ -31,7 +31,7 @@ double difference(const std::vector<std::vector<double>>& expected,
 
 using Sound = std::vector<std::vector<double>>;
 
-// Masses that a name reaches, each with its Event::value2.
+// Masses that a name can reach, each with its Event::value2.
 std::vector<std::pair<std::string, std::uint32_t>> named_masses(const std::string& text) {
   const Network network = network_of(text);
   std::vector<std::pair<std::string, std::uint32_t>> found;
@@ -79,8 +79,8 @@ struct StruckTwice {
   Event blow_with_input;
 };
 
-// In every published method a strike is what the input does in the direct one, whether there is
-// such an input or not.
+// With every published kernel, a strike equals the input's effect in the direct kernel, with or
+// without such an input.
 void check_strike(const StruckTwice& struck, std::set<Method>& seen) {
   CompileOptions options{.rate_hz = 48000.0, .bare = true, .method = Method::direct};
   const Sound by_input = play(struck.with_input, options, pushed());
@@ -97,8 +97,8 @@ void check_strike(const StruckTwice& struck, std::set<Method>& seen) {
   }
 }
 
-// Without damping a blow between two samples is what a force in the second of them does, to
-// rounding: links pull by the places of before.
+// Without damping, a strike between two samples equals a force in the second of them to rounding,
+// because links act by earlier positions.
 TEST_CASE("A struck mass moves as a force input would move it", "[strike]") {
   const std::vector<std::string> texts = {
       scenes::string("s", 20, "0.1", "0.") + "@in1 frcInput @s_m4\n" + scenes::output(1, "s_m16"),
@@ -123,14 +123,14 @@ TEST_CASE("A struck mass moves as a force input would move it", "[strike]") {
   CHECK(seen.size() == methods_for(KernelRow::Use::published).size());
 }
 
-// With it the blow is damped in its own sample already where a kernel finds forces as it goes: a
-// share of Z/M, which is at most 0.02 here.
+// With damping, kernels that compute forces within the sample damp the strike at once: a share of
+// Z/M, at most 0.02 here.
 TEST_CASE("A struck mass of any network moves nearly like one with a force input", "[strike]") {
   std::size_t compared = 0;
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
     const RandomNetwork random = random_network(seed);
     const auto masses = named_masses(random.text);
-    // A force output is told of the input's force, and of no blow.
+    // A force output includes an input's force, but no strike.
     if (masses.empty() || !random.is_linear || random.text.find("frcOutput") != std::string::npos) {
       continue;
     }
@@ -158,8 +158,8 @@ TEST_CASE("A struck mass of any network moves nearly like one with a force input
   CHECK(compared > 100);
 }
 
-// A kernel that steps by another one has told it nothing before its first step. Several steps a
-// sample feel the blow for a part of one, which the fastest mode moves by a hundredth in.
+// A kernel inside another one is uninitialised before its first step. With several steps per sample
+// the strike acts for part of a sample, which changes the fastest mode by a hundredth.
 TEST_CASE("A voice is struck in its first sample", "[strike]") {
   const std::string text = scenes::string("s", 5, "0.000001", "0.") + scenes::output(1, "s_m3");
   Event blow = struck_at(named_masses(text)[1].second);
@@ -175,7 +175,7 @@ TEST_CASE("A voice is struck in its first sample", "[strike]") {
   }
 }
 
-// Which mass a name stands for, as whoever strikes it asks.
+// Returns the mass that a name refers to.
 std::uint32_t mass_called(const std::string& text, const std::string& name) {
   const auto compiled =
       compile_network(network_of(text), Preset(), {.rate_hz = 48000.0, .bare = true});
@@ -190,12 +190,12 @@ std::uint32_t mass_called(const std::string& text, const std::string& name) {
 
 struct StruckPlace {
   std::string text;
-  std::string place;  // as the model writes it
-  std::string name;   // by which it is struck
+  std::string place;  // As written in the model.
+  std::string name;   // Name used for the strike.
 };
 
-// What has dampers is struck as a force input pushes wherever a kernel keeps the forces of the next
-// sample, or knows what a mode loses: so in the direct form and by modes.
+// With dampers a strike equals a force input in kernels that store the forces of the next sample or
+// know the loss of a mode: in the direct form and by modes.
 TEST_CASE("A struck place moves as a force input there would move it", "[strike]") {
   const std::string strings =
       "@p param 0.6\n@s waveguide 1. 220. 3. 0.4 0.\n@t openWaveguide 0.5 110. 3. 0.6 0.\n"
@@ -204,7 +204,7 @@ TEST_CASE("A struck place moves as a force input there would move it", "[strike]
   const std::string bell =
       "@bell body 40. rim waist crown\n@b1 mode @bell 310.7 4.2 1. -0.61 0.02\n"
       "@b2 mode @bell 601.2 0.3 0.8 0.35 0.9\n@b3 mode @bell 1533. 0.05 -0.3 0.5 1.4\n"
-      "@b4 mode @bell 23000. 0.05 0.2 0.3 0.4\n";  // it hardly rings
+      "@b4 mode @bell 23000. 0.05 0.2 0.3 0.4\n";  // It hardly rings.
   const std::string box =
       "@m mass 2. 0. 0.\n@c springDamper @m [@bell crown] 0.05 0.003\n" + scenes::output(3, "m");
   const std::string heard = "@out1 posOutput [@bell crown]\n@out2 posOutput [@bell 0.25]\n";
@@ -234,7 +234,7 @@ TEST_CASE("A struck place moves as a force input there would move it", "[strike]
   CHECK(seen.size() >= 4);
 }
 
-// In a voice as notes play it, in single precision too, at another pitch.
+// In a voice as notes play it, in single precision, too, at another pitch.
 TEST_CASE("A struck place sounds at the pitch of the last key", "[strike]") {
   const std::string text =
       "@s waveguide 1. 220. 3. 0.4 0.\n@in1 frcInput [@s 0.2]\n@out1 posOutput [@s 0.3]\n";
@@ -245,7 +245,7 @@ TEST_CASE("A struck place sounds at the pitch of the last key", "[strike]") {
     player.run(20000, {note_on(0, 64, 1e-9), event});
     return player.out;
   };
-  // As hard as moves it as far: a lighter stroke would do for a slower string.
+  // The force is scaled so that the displacement is equal: a slower string needs less.
   const Event push{.frame = blow_frame,
                    .kind = EventKind::gesture,
                    .gesture = Gesture::force,
@@ -274,7 +274,7 @@ TEST_CASE("A model without any input is struck, and costs nothing until then", "
   player.run(4410, {struck_at(mass)});
   CHECK(player.compiled.engine->meters().stepped == 1);
   CHECK(peak(player.y()) > 0.0);
-  // What nobody hears is left out as before.
+  // Inaudible parts are culled as before.
   const auto deaf =
       compile_network(network_of(scenes::string("s", 20, "0.1", "0.001")), preset, options);
   REQUIRE(deaf);

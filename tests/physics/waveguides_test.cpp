@@ -1,5 +1,5 @@
-// One waveguide, judged from what it renders: its pitch and decay by an estimator of their own, its
-// junctions by closed forms and by a string of masses that is the same in other coordinates.
+// One waveguide, judged by its render: pitch and decay by an independent estimator, junctions by
+// closed forms and by an equivalent string of masses.
 #include <complex>
 
 #include "core/kernels/waveguides/design.h"
@@ -29,8 +29,8 @@ struct Partial {
   double t60_s = 0.0;
 };
 
-// The partial near a guess: the same window, a little earlier and a little later, sees it turned by
-// its angle and shrunk by its decay; a Blackman-Harris window keeps all others 92 dB away.
+// The partial near a guess: two windows at different times give its frequency from the phase
+// advance and its decay from the level; a Blackman-Harris window keeps other partials 92 dB away.
 Partial partial_of(std::span<const double> y, double rate_hz, double guess_hz, std::size_t window,
                    std::size_t later) {
   const auto seen = [&](std::size_t from) {
@@ -51,7 +51,7 @@ Partial partial_of(std::span<const double> y, double rate_hz, double guess_hz, s
           -3.0 * std::numbers::ln10 * samples / rate_hz / std::log(std::abs(ratio))};
 }
 
-// What a place does after a tap on another.
+// The response of a place to a tap on another.
 std::vector<double> rendered(const std::string& line, double rate_hz, std::size_t frames) {
   Bare<double> bare(
       program_at("@s " + line + "\n@in1 frcInput [@s 0.37]\n@out1 posOutput [@s 0.23]\n", rate_hz));
@@ -66,7 +66,7 @@ double key_hz(int key) {
   return 440.0 * std::exp2((key - 69) / 12.0);
 }
 
-// A kernel whose nodes are looked at as they are; those that move come first.
+// A kernel whose node states are accessible; moving nodes come first.
 struct Watched : Bare<double> {
   explicit Watched(const std::string& text, double rate_hz = Network::reference_rate_hz)
       : Bare(program_at(text, rate_hz)) {}
@@ -97,7 +97,7 @@ TEST_CASE("88 keys of waveguides have the requested pitch and decay", "[waveguid
       const auto y = rendered((is_open ? "openWaveguide 1.3 " : "waveguide 1.3 ") + number(hz) +
                                   " " + number(t60) + " " + number(brightness) + " 0.",
                               rate, window + later);
-      // An open one drifts by a step, which a difference takes away.
+      // An open waveguide drifts by a step, which a difference removes.
       std::vector<double> speed(y.size());
       std::adjacent_difference(y.begin(), y.end(), speed.begin());
       const Partial found = partial_of(speed, rate, hz, window, later);
@@ -131,7 +131,7 @@ TEST_CASE("a waveguide's loop never gains energy and stays within its memory", "
       most = std::max(most, std::abs(found.gain * (1.0 - found.pole) / (1.0 - found.pole * back)));
     }
     REQUIRE(most <= 1.0 + 1e-15);
-    // The loop's own pole, where the numbers ask for nothing out of reach.
+    // The loop's own pole, if the requested values are reachable.
     if (numbers.frequency_hz < 20.0 || numbers.frequency_hz > highest_waveguide_hz(least, rate) ||
         numbers.t60_s * numbers.frequency_hz < least_t60_periods) {
       continue;
@@ -181,7 +181,7 @@ TEST_CASE("a mass on a spring reflects waves as its impedance says", "[waveguide
   constexpr double impedance = 2.0 * r;
   constexpr double mass = 0.5;
   constexpr double stiffness = 5.0 * r * r;
-  // 6,000 samples from end to end: what is seen at 0.35 comes from the place at 0.5 alone.
+  // 6,000 samples from end to end: the signal at 0.35 comes from the place at 0.5 only.
   Watched guide(
       "@s waveguide 2. 16. 1e30 1. 0.\n@m mass 0.5 0. 0.\n@k spring [@s 0.5] @m 5.\n"
       "@in1 frcInput [@s 0.25]\n@out1 posOutput [@s 0.35]\n",
@@ -195,7 +195,7 @@ TEST_CASE("a mass on a spring reflects waves as its impedance says", "[waveguide
     v.push_back(0.5 * (now + before));
     before = now;
   }
-  // The pulse passes 600 samples after it was made, and comes back by twice 900 later.
+  // The pulse passes 600 samples after it was made, and returns 1800 samples later.
   const auto spectrum = [&](int first, int last, double theta) {
     Complex sum = 0.0;
     for (int n = first; n < last; ++n) {
@@ -268,7 +268,7 @@ TEST_CASE("a glide reaches its pitch without noise", "[waveguides]") {
   double most = 0.0;
   double before = 0.0;
   for (int n = 0; n < 72000; ++n) {
-    if (n >= 4000 && n < 30000 && n % 64 == 0) {  // a fifth in half a second
+    if (n >= 4000 && n < 30000 && n % 64 == 0) {  // A fifth in half a second.
       const double way = static_cast<double>(n - 4000) / 26000.0;
       guide.set_coefficients(0, {220.0 * std::pow(1.5, way)}, 1.0, false);
     }
@@ -340,8 +340,8 @@ TEST_CASE("twenty places on a short waveguide occupy distinct samples", "[wavegu
   CHECK(late > 0.3 * early);
 }
 
-// A loop of N samples has N(N-1)/2 pairs of places, every one another shortest way between two
-// samples that may not be read together; with pitches, places and lanes at random.
+// A loop of N samples has N(N-1)/2 pairs of places, with different shortest paths between samples
+// that must not be read together; random pitches, places and lanes.
 TEMPLATE_TEST_CASE("block-wise processing of waves has the bits of sample-wise processing",
                    "[waveguides]", float, double) {
   const std::string text =

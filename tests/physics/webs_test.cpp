@@ -1,5 +1,5 @@
-// Springs that bend, so many that what they hold is kept in one number: judged by what is heard
-// alone, with potentials written down here.
+// Many nonlinear springs whose energy is one auxiliary variable, judged by the outputs, with
+// potentials defined in this file.
 #include "core/kernels/passive/clusters.h"
 #include "core/laws/laws.h"
 #include "tests/support/passive.h"
@@ -12,7 +12,7 @@ using namespace support;
 constexpr int side = 13;
 constexpr double k = .1;
 
-// 13 by 13 masses, held at their corners, with a spring of `law` between neighbours: 312 of them.
+// 13 by 13 masses, held at their corners, with a spring of `law` between neighbours: 312 springs.
 std::string mesh(const std::string& law, const std::string& more = "") {
   const auto name = [](int i, int j) { return "@m" + std::to_string(i) + "_" + std::to_string(j); };
   std::string text = "@g ground 0.\n@w ground -0.05\n";
@@ -44,12 +44,12 @@ std::string mesh(const std::string& law, const std::string& more = "") {
 }
 
 struct Balance {
-  double excess = 0.0;  // of what moves and of straight springs over the work put in, of all work
-  double drift = 0.0;   // of the same and what all springs hold, once the blow is over
+  double excess = 0.0;  // Kinetic energy and linear springs minus work, relative to all work.
+  double drift = 0.0;   // The same plus the nonlinear springs, after the strike.
   bool is_finite = true;
 };
 
-// `kept` is what the springs that bend hold at a distance.
+// `kept` is the potential of the nonlinear springs at a distance.
 template <class Kept>
 Balance judge(const std::string& text, double blow, int frames, double damping, Kept&& kept) {
   Stepper<double> body(text, Passivity::always);
@@ -147,8 +147,8 @@ TEST_CASE("a web gains no energy at any strike", "[webs]") {
 }
 
 TEST_CASE("a web keeps the energy of its springs", "[webs]") {
-  // As far as its number follows their potential: the less so the more of what moves is near half
-  // the rate, where a contact of K = M puts much. It takes none of what it is hit with.
+  // The variable follows the springs' potential less accurately when motion is near half the rate,
+  // which a contact of K = M excites. No work is lost.
   const std::string springs = "nlSpring3 .1 .01 0.";
   const std::string contact = "@c contact @w @m6_6 1. 0.\n";
   CHECK(judge(mesh(springs), .1, 20'000, 0.0, cubic).drift < 1e-4);
@@ -158,8 +158,8 @@ TEST_CASE("a web keeps the energy of its springs", "[webs]") {
 }
 
 TEST_CASE("a web is as accurate as the published scheme, against eight times the rate", "[webs]") {
-  // Signal to error over 10 ms. Where springs grow to seven times their stiffness at rest, what is
-  // published is a tenth further off; somewhat further on it is lost, and the web goes on.
+  // Signal-to-error ratio over 10 ms. Where springs reach seven times their stiffness at rest, the
+  // published scheme is a tenth worse; a little further it diverges, and the web continues.
   const auto heard = [](double blow, int times, Passivity passive) {
     const Network network = network_of(mesh("nlSpring3 .1 .01 0.0001"));
     Bare<double> bare(

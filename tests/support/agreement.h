@@ -1,4 +1,4 @@
-// tests: what every kernel owes to the direct one, which moves a network as it is written.
+// tests: the agreement required of every kernel with the direct one.
 #pragma once
 
 #include <algorithm>
@@ -14,11 +14,10 @@ inline double tolerance_of(Method method) {
   return method == Method::modal ? 1e-9 : 1e-12;
 }
 
-// What float keeps at least, unless the direct kernel keeps hardly more: of a force beside
-// positions, of what is faint behind what is loud. A grid's sums at its border are of whole
-// positions, and so are the rows of a matrix: they keep less of what moves as a whole and is hardly
-// stretched. Links that are not linear add the rounding of where they act, and what drifts is far
-// from 0.
+// The least agreement in float, unless the direct kernel itself has little more: errors of a force
+// output relative to positions, and of quiet outputs beside loud ones. A grid's border sums and a
+// matrix's rows contain absolute positions, so they lose precision for rigid motion. Nonlinear
+// links add rounding of their thresholds, and drifting networks are far from 0.
 inline double least_db(Method method, bool is_plain) {
   const bool is_of_links =
       method == Method::direct || method == Method::chains || method == Method::batch;
@@ -26,7 +25,7 @@ inline double least_db(Method method, bool is_plain) {
 }
 inline constexpr double hardly_db = 6.0;
 
-// Where nothing is to be heard, the rounding of what moves elsewhere may be.
+// A silent output may contain rounding errors of other motion.
 inline void check_double(Method method, const std::vector<Comparison>& outputs) {
   for (const Comparison& output : outputs) {
     INFO("double is off by " << show(output.worst) << " of " << show(output.peak));

@@ -1,9 +1,9 @@
-// tests: the profiles of the bells among the models, as solids of revolution. They were found by
-// axisymmetric finite elements: from that of a swinging bell a metre wide, radii and walls were
-// changed by Newton's method, as little as needed, until hum, prime, tierce, quint and nominal were
-// 0.5 : 1 : 1.2 : 1.5 : 2 (ChurchBell) and 0.5 : 1 : 1.25 : 1.5 : 2 (MajorBell); likewise from a
-// bell three times as wide, its twelfth at 3 and its nominal at 261.6 Hz (Bourdon), and from a thin
-// cup, until its two lowest partials were 1 : 3 at 392 Hz (HandBell).
+// tests: profiles of the bells among the models, as solids of revolution. They were found by
+// axisymmetric finite elements: starting from a church bell one metre wide, radii and wall
+// thicknesses were changed by Newton's method, as little as needed, until hum, prime, tierce, quint
+// and nominal were 0.5 : 1 : 1.2 : 1.5 : 2 (ChurchBell) and 0.5 : 1 : 1.25 : 1.5 : 2 (MajorBell);
+// likewise from a bell three times as wide, with its twelfth at 3 and its nominal at 261.6 Hz
+// (Bourdon), and from a thin cup, until its two lowest partials were 1 : 3 at 392 Hz (HandBell).
 #pragma once
 
 #include <algorithm>
@@ -15,8 +15,8 @@
 
 namespace ressort::support {
 
-// Height, radius of the wall's middle and its thickness, in metres, from the lip to the crown; a
-// Catmull-Rom spline goes through them.
+// Height, radius of the wall's centre line and thickness, in metres, from the lip to the crown,
+// joined by a Catmull-Rom spline.
 using BellProfile = std::vector<std::array<double, 3>>;
 
 inline const BellProfile church_bell = {{0.0000, 0.4920, 0.0300}, {0.0550, 0.4620, 0.0729},
@@ -64,7 +64,7 @@ inline std::array<double, 3> along_bell(const BellProfile& profile, double s) {
   return at;
 }
 
-// Its surface, with so many pieces from the lip to the crown and around.
+// Returns its surface with `pieces` from the lip to the crown and `steps` around.
 inline Surface bell_surface(const BellProfile& profile, int pieces, int steps) {
   const double last = static_cast<double>(profile.size()) - 1.0;
   std::vector<std::array<double, 2>> outside;
@@ -86,8 +86,7 @@ inline Surface bell_surface(const BellProfile& profile, int pieces, int steps) {
   return revolved(around, steps);
 }
 
-// A partial by how many meridians it has, which of those it is from below, and which of the
-// model's it is.
+// A partial: its number of nodal meridians, its order among those, and its index in the model.
 struct BellPartial {
   int meridians = 2;
   std::size_t from_below = 0;
@@ -97,10 +96,10 @@ struct BellPartial {
 struct Bell {
   const char* name;
   BellProfile profile;
-  std::vector<BellPartial> partials;  // the first is what others are compared to
+  std::vector<BellPartial> partials;  // The others are relative to the first.
 };
 
-// Nominal, hum, prime, tierce, quint and twelfth; of the handbell its six lowest.
+// Nominal, hum, prime, tierce, quint and twelfth; for the handbell its six lowest.
 inline const std::vector<BellPartial> church_partials = {{4, 0, 4}, {2, 0, 0}, {2, 1, 1},
                                                          {3, 0, 2}, {3, 1, 3}, {5, 0, 7}};
 inline const std::vector<BellPartial> hand_partials = {{2, 0, 0}, {3, 0, 1}, {4, 0, 2},

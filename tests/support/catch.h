@@ -1,9 +1,9 @@
-// tests: the one place that knows which Catch2 is installed, 2 or 3.
+// tests: hides the difference between Catch2 versions 2 and 3.
 #pragma once
 
 #if __has_include(<catch2/catch.hpp>)
-// Assertions without a handler of exceptions each: a test that throws ends its case, not its line,
-// and all of them are compiled in a fourteenth less time.
+// Assertions without an exception handler each: an exception ends the test case instead of the
+// assertion, and compilation takes 7 % less time.
 #define CATCH_CONFIG_FAST_COMPILE
 #include <catch2/catch.hpp>
 #else

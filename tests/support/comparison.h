@@ -1,4 +1,4 @@
-// tests: a kernel against the direct one, the same hands and the same turns of parameters on both.
+// tests: compares a kernel with the direct one under the same inputs and parameter changes.
 #pragma once
 
 #include <span>
@@ -10,20 +10,20 @@ namespace ressort::support {
 struct ComparisonOptions {
   std::size_t frames = 44100;
   std::uint64_t seed = 1;
-  double reach = 0.1;      // of the inputs' motion, in positions or forces
-  double push = 0.0;       // of the force inputs' instead, if it is not 0
-  double lowest_hz = 0.5;  // of the position inputs' motion
+  double reach = 0.1;      // Amplitude of the inputs, in positions or forces.
+  double push = 0.0;       // Amplitude of force inputs, if not 0.
+  double lowest_hz = 0.5;  // Lowest frequency of position inputs.
   double highest_hz = 6.0;
-  bool turns = false;  // parameters move by up to a tenth, ramped over 128 samples
-  double pitch = 1.0;  // stiffness factor of the first voice
+  bool turns = false;  // Parameters change by up to a tenth, ramped over 128 samples.
+  double pitch = 1.0;  // Stiffness factor of the first voice.
   Isa isa = best_isa();
 };
 
-// All that happens in a comparison. Blocks are of uneven lengths, as a host's events cut them.
+// The inputs of a comparison. Blocks have uneven lengths, as if cut by events.
 struct Score {
   struct Block {
     std::size_t frames = 0;
-    std::vector<double> parameters;  // those that are turned to as it begins; none: as before
+    std::vector<double> parameters;  // New values at the start of the block; empty: unchanged.
   };
   double pitch = 1.0;
   std::vector<Block> blocks;
@@ -103,7 +103,7 @@ class Fighter {
     }
   }
 
-  // inputs[frame][input], audio[frame][audio parameter]; gives [frame][output].
+  // Takes inputs[frame][input] and audio[frame][audio parameter]; returns [frame][output].
   std::vector<double> play(std::span<const std::vector<double>> inputs,
                            std::span<const std::vector<double>> audio = {}) {
     const std::size_t count = program_.inputs.size();
@@ -181,14 +181,14 @@ std::vector<double> perform(const Program& program, const Score& score, Isa isa)
   return heard;
 }
 
-// As it is written, in double.
+// Plays the direct form in double.
 inline std::vector<double> perform_directly(const Program& program, const Score& score) {
   Program plain = program;
   plain.form = Direct{};
   return perform<double>(plain, score, Isa::base);
 }
 
-// One Comparison for each output.
+// Returns one Comparison per output.
 inline std::vector<Comparison> compare(std::size_t outputs, std::span<const double> expected,
                                        std::span<const double> found) {
   std::vector<Comparison> comparisons(outputs);
@@ -198,7 +198,7 @@ inline std::vector<Comparison> compare(std::size_t outputs, std::span<const doub
   return comparisons;
 }
 
-// How far `formed` in precision T is from the same Program in the direct form in double.
+// Compares `formed` in precision T with the same Program in the direct form in double.
 template <class T>
 std::vector<Comparison> compare_kernels(const Program& formed, const ComparisonOptions& options) {
   const Score score = score_of(formed, options);
@@ -206,7 +206,7 @@ std::vector<Comparison> compare_kernels(const Program& formed, const ComparisonO
                  perform<T>(formed, score, options.isa));
 }
 
-// Every output in every instruction set: double within `relative`, float above `db`.
+// Checks every output on every instruction set: double within `relative`, float above `db`.
 inline void same_as_direct(const Program& program, ComparisonOptions options, double relative,
                            double db) {
   for (const Isa isa : isas()) {

@@ -1,5 +1,5 @@
-// tests: what Eigen does with dense matrices, as plain functions, so that its templates are
-// compiled once for all tests. Needs Eigen.
+// tests: Eigen's dense matrix functions as plain functions, so that their templates are compiled
+// once for all tests. Needs Eigen.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,13 +15,13 @@ struct Eigenbasis {
   Eigen::MatrixXd vectors;  // [row, pair]
 };
 
-// Of a symmetric matrix.
+// Eigenpairs of a symmetric matrix.
 Eigenbasis eigenbasis_of(const Eigen::MatrixXd& matrix);
 
-// The w of A x = w B x, ascending; both symmetric, B positive.
+// Returns the w of A x = w B x, ascending, for symmetric A and symmetric positive definite B.
 Eigen::VectorXd pencil_values(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 
-// The x for which |A x - B| is the least, column by column.
+// Return the x that minimises |A x - B|, column by column.
 Eigen::MatrixXd least_squares(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 Eigen::MatrixXcd least_squares(const Eigen::MatrixXcd& a, const Eigen::MatrixXcd& b);
 

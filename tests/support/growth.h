@@ -1,4 +1,4 @@
-// Whether a network is stable, by kicking it; and how far its bound says that it is.
+// Tests the stability of a network by simulation, and returns its bound.
 #pragma once
 
 #include <cmath>
@@ -10,7 +10,7 @@
 
 namespace ressort::support {
 
-inline constexpr double bound_limit = 3.92;  // 4, and two percent to spare
+inline constexpr double bound_limit = 3.92;  // 4 less a margin of two per cent.
 
 inline const std::string mass_and_ground = "@m mass 2. 0. 0.\n@g ground 0.\n";
 
@@ -20,7 +20,7 @@ inline double factor_of(const std::string& text, double rate_ratio = 1.0) {
   return highest_stiffness_factor(network, {values, values}, rate_ratio);
 }
 
-// How large a network that was kicked gets when every stiffness is multiplied.
+// Growth of a network after an impulse, with every stiffness multiplied by a factor.
 inline double growth(const Network& network, double factor) {
   Program program = make_program(network, 44100.0, true);
   for (std::size_t i = 0; i < program.moving; ++i) {

@@ -1,4 +1,4 @@
-// tests: what several of them need to drive a network by hand and to compare what comes out.
+// tests: drives networks and compares outputs.
 #pragma once
 
 #include <algorithm>
@@ -34,12 +34,12 @@ inline Network network_of(const std::string& text) {
   return std::move(parsed.network);
 }
 
-// In the published units, before a form is chosen for it.
+// Returns the Program in published units, before a form is chosen.
 inline Program program_of(const std::string& text) {
   return make_program(network_of(text), Network::reference_rate_hz, true);
 }
 
-// All that this machine and this build have.
+// Returns all instruction sets that both machine and build support.
 inline std::vector<Isa> isas() {
   std::vector<Isa> all;
   for (const Isa isa : {Isa::base, Isa::v3, Isa::v4}) {
@@ -50,8 +50,8 @@ inline std::vector<Isa> isas() {
   return all;
 }
 
-// A hand that wanders smoothly within -1..1: a few slow sines of random pitch and phase. It
-// starts at 0.
+// A smooth random motion within -1..1: a sum of slow sines with random frequency and phase. Starts
+// at 0.
 class Motion {
  public:
   Motion(std::uint64_t seed, double lowest_hz, double highest_hz) {
@@ -77,7 +77,7 @@ class Motion {
   std::array<Sine, 5> sines_;
 };
 
-// A Program stepped with nothing around it: its kernel alone.
+// The kernel of a Program, stepped directly.
 template <class T>
 class Bare {
  public:
@@ -115,7 +115,7 @@ class Bare {
     return run(0);
   }
 
-  // One input's position or force in one lane, for the next run().
+  // Sets one input's position or force in one lane for the next run().
   void feed(std::size_t lane, std::size_t input, double value) {
     double& before = before_[lane * program_.inputs.size() + input];
     value_[input * lanes() + lane] = static_cast<T>(value);
@@ -123,7 +123,7 @@ class Bare {
     before = value;
   }
 
-  // Steps every lane; gives one lane's outputs.
+  // Steps every lane; returns one lane's outputs.
   std::vector<double> run(std::size_t lane) {
     kernel_->step({.frames = 1,
                    .value = value_.data(),
@@ -153,7 +153,7 @@ class Bare {
   std::vector<double> before_;  // [lane][input]
 };
 
-// Two series compared: the largest difference in shares of the largest value, and in dB.
+// Compares two series: the largest difference relative to the largest value, and in dB.
 struct Comparison {
   double peak = 0.0;
   double worst = 0.0;

@@ -1,9 +1,9 @@
-// tests: the heap as main.cpp keeps it, counting.
+// tests: the counting heap of main.cpp.
 #pragma once
 
 #include <cstddef>
 
-// The sanitizers bring a heap of their own, which tells more than a count would.
+// The sanitizers replace the heap by their own, which detects more than a count.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define RESSORT_OTHER_HEAP 1
 #elif defined(__has_feature)
@@ -20,8 +20,8 @@ inline constexpr bool heap_is_counted = false;
 inline constexpr bool heap_is_counted = true;
 #endif
 
-// Counts this thread's calls of operator new and delete from its making on; at most one lives.
-// main.cpp keeps the heap.
+// Counts this thread's calls of operator new and delete during its lifetime; one instance at a
+// time. main.cpp implements the heap.
 class HeapWatch {
  public:
   HeapWatch();
@@ -31,8 +31,8 @@ class HeapWatch {
   std::size_t calls() const;
 };
 
-// What all threads hold of operator new, in bytes; 0 where the heap is not counted. The C library's
-// own figure counts what it keeps for each thread's next use as well.
+// Returns the bytes allocated by operator new on all threads; 0 if the heap is not counted. The C
+// library's own figure includes per-thread caches.
 std::size_t heap_bytes();
 
 }  // namespace ressort::support

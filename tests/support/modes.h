@@ -1,4 +1,4 @@
-// tests: a network in its modes, and whether it does as the direct kernel does.
+// tests: compares a network's modal form with the direct kernel.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// tests: one partial of a sound, by how far its phase and its level have gone.
+// tests: measures one partial of a sound from its phase and level.
 #pragma once
 
 #include <cmath>
@@ -8,9 +8,9 @@
 
 namespace ressort::support {
 
-// A partial's frequency and T60 between two stretches of a second or less: how much further its
-// phase is than a guess, and how much less of it there is. Blackman and Harris' window of four
-// terms keeps others 92 dB away.
+// A partial's frequency and T60 between two windows of a second or less: from the phase advance
+// beyond a guess, and from the drop in level. A four-term Blackman-Harris window keeps others 92 dB
+// away.
 struct HeardPartial {
   double hz = 0.0;
   double t60_s = 0.0;

@@ -1,4 +1,4 @@
-// tests: a network whose links are passive, or as published, its kernel alone.
+// tests: the kernel of a network with passive or published links.
 #pragma once
 
 #include <string>
@@ -20,7 +20,7 @@ inline Program program_of(const std::string& text, Passivity passive) {
                       schemes_of(network, passive).links);
 }
 
-// The positions and speeds of all nodes; masses come first.
+// Positions and speeds of all nodes; masses come first.
 template <class T>
 struct Stepper : Bare<T> {
   Stepper(const std::string& text, Passivity passive, Isa isa = best_isa())
@@ -28,7 +28,7 @@ struct Stepper : Bare<T> {
         x(this->program().position.size()),
         v(x.size()) {}
 
-  // One mass, from anywhere: the next sample is free flight.
+  // Places one mass; the next sample is free flight.
   void set_state(double x0, double v0) {
     x = this->program().position;
     v = this->program().velocity;

@@ -1,4 +1,4 @@
-// tests: the pitch of a sound, by nothing but the sound.
+// tests: measures the pitch of a sound from the sound only.
 #pragma once
 
 #include <cmath>
@@ -9,9 +9,9 @@
 
 namespace ressort::support {
 
-// The frequency where the spectrum under a Hann window is largest, near a guess. A decaying sine
-// has its peak at its own frequency, and the window keeps the others out of the way. `width` is how
-// much of the guess it may be off: not so much that there is a second peak.
+// Returns the frequency of the largest peak near a guess in the spectrum under a Hann window. A
+// decaying sine peaks at its own frequency, and the window suppresses other partials. `width`:
+// relative search range, narrow enough to exclude a second peak.
 inline double measured_hz(std::span<const double> y, double rate_hz, double guess_hz,
                           double width = 0.03) {
   std::vector<double> seen(y.begin(), y.end());
@@ -31,7 +31,7 @@ inline double measured_hz(std::span<const double> y, double rate_hz, double gues
   };
   double low = guess_hz * (1.0 - width);
   double high = guess_hz * (1.0 + width);
-  for (int i = 0; i < 40; ++i) {  // golden section
+  for (int i = 0; i < 40; ++i) {  // Golden-section search.
     const double a = high - (high - low) * 0.6180339887498949;
     const double b = low + (high - low) * 0.6180339887498949;
     if (magnitude(a) > magnitude(b)) {

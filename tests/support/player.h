@@ -1,4 +1,4 @@
-// tests: an engine as compile_network() makes it, played and listened to.
+// tests: an engine from compile_network(), played and recorded.
 #pragma once
 
 #include <span>
@@ -37,7 +37,7 @@ inline Event parameter(std::uint32_t frame, int index, double value) {
           .value = value};
 }
 
-// Every note strikes input 1, the harder the louder.
+// Every note strikes input 1 with a force proportional to velocity.
 inline Preset struck(int voices) {
   Preset preset;
   preset.voices = voices;
@@ -52,7 +52,7 @@ inline std::string ringing_string() {
          scenes::output(1, "s_m6");
 }
 
-// An engine and all that it has played.
+// An engine and its recorded output.
 class Player {
  public:
   explicit Player(Compiled made)
@@ -64,8 +64,8 @@ class Player {
     out.resize(static_cast<std::size_t>(compiled.instrument.outputs));
   }
 
-  // `events` are sorted and count their frames from the start of this run; the lengths of the
-  // blocks come round and round.
+  // `events` are sorted and count frames from the start of this run; block lengths repeat
+  // cyclically.
   void run(std::size_t frames, const std::vector<Event>& events = {},
            const std::vector<std::size_t>& blocks = {256},
            std::span<const double* const> inputs = {}) {
@@ -80,7 +80,7 @@ class Player {
       }
       std::vector<double*> outputs;
       for (auto& channel : out) {
-        channel.resize(channel.size() + n, 1e300);  // what process() is to overwrite
+        channel.resize(channel.size() + n, 1e300);  // Overwritten by process().
         outputs.push_back(channel.data() + channel.size() - n);
       }
       std::vector<const double*> here;
@@ -99,7 +99,7 @@ class Player {
 
   Compiled compiled;
   std::vector<std::vector<double>> out;  // [channel]
-  std::size_t heap_calls = 0;            // during process()
+  std::size_t heap_calls = 0;            // During process().
 };
 
 inline double peak(std::span<const double> y) {

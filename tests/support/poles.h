@@ -1,5 +1,5 @@
-// tests: what a kernel does to a linear network in one sample, as a matrix, and the network itself
-// as matrices: poles of the one and of the other. Needs Eigen.
+// tests: the step matrix of a kernel on a linear network, the network's matrices, and the poles of
+// both. Needs Eigen.
 #pragma once
 
 #include <algorithm>
@@ -12,8 +12,8 @@
 
 namespace ressort::support {
 
-// (x, v) of the moving nodes after a sample, from those before it. Found by letting the kernel step
-// from each of them alone: links pull from the second sample on.
+// The map of (x, v) of the moving nodes over one sample, found by stepping the kernel from each
+// unit vector; links act from the second sample on.
 template <class T = double>
 Eigen::MatrixXd transition(const Program& program, Isa isa = best_isa()) {
   Bare<T> bare(program, 1, isa);
@@ -55,7 +55,7 @@ inline Pole pole_of(std::complex<double> z, double rate_hz = Network::reference_
           .z = z};
 }
 
-// Those that oscillate, by pitch.
+// Returns the oscillating poles by frequency.
 inline std::vector<Pole> poles_of(const Eigen::MatrixXd& step) {
   std::vector<Pole> poles;
   const Eigen::VectorXcd values = eigenvalues_of(step);
@@ -73,7 +73,7 @@ inline double spectral_radius(const Eigen::MatrixXd& step) {
   return eigenvalues_of(step).cwiseAbs().maxCoeff();
 }
 
-// Masses, springs and dampers of a Program of springs alone, at its own rate.
+// Masses, springs and dampers of a Program with springs only, at its own rate.
 struct Matrices {
   Eigen::VectorXd mass;
   Eigen::MatrixXd stiffness;
@@ -111,7 +111,7 @@ inline Matrices matrices_of(const Program& program) {
   return matrices;
 }
 
-// The continuous network's, as if it were sampled: e^s for every root of M s^2 + Z s + K.
+// Poles of the sampled continuous network: e^s for every root of M s^2 + Z s + K.
 inline std::vector<Pole> continuous_poles(const Matrices& matrices) {
   const Eigen::Index n = matrices.mass.size();
   Eigen::MatrixXd motion = Eigen::MatrixXd::Zero(2 * n, 2 * n);
@@ -131,9 +131,8 @@ inline std::vector<Pole> continuous_poles(const Matrices& matrices) {
   return poles;
 }
 
-// The continuous network's motion, in closed form, where dampers are everywhere in the same
-// proportion to springs and masses are all alike: each mode goes through where it is at the start
-// and one sample later.
+// The continuous network's motion in closed form, for proportional dampers and equal masses: each
+// mode passes through its value at the start and one sample later.
 class Continuous {
  public:
   explicit Continuous(const Program& program) {
@@ -162,7 +161,7 @@ class Continuous {
     }
   }
 
-  // The position of a node at 0, 1, 2... samples.
+  // Returns the position of a node at samples 0, 1, 2, ...
   std::vector<double> at(std::uint32_t node, std::size_t frames) const {
     std::vector<double> sum(frames, 0.0);
     for (std::size_t j = 0; j < step_.size(); ++j) {

@@ -1,4 +1,4 @@
-// tests: numbers that repeat, and how they are written.
+// tests: reproducible random numbers and their printing.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 
 namespace ressort::support {
 
-// The same numbers on every machine (splitmix64).
+// splitmix64: the same numbers on every machine.
 class Random {
  public:
   explicit Random(std::uint64_t seed) : state_(seed) {}
@@ -27,7 +27,7 @@ class Random {
   std::uint64_t state_;
 };
 
-// A number as a person reads it: Catch would print 1e-13 as 0.
+// Prints a number in full: Catch would print 1e-13 as 0.
 inline std::string show(double value) {
   char text[40];
   std::snprintf(text, sizeof text, "%.10g", value);

@@ -1,5 +1,4 @@
-// tests: sounds of which every mode is known, and what was found of them beside it. Written down as
-// they are defined; nothing of core is asked.
+// tests: sounds with known modes, and the errors of an identification. Independent of core.
 #pragma once
 
 #include <algorithm>
@@ -57,7 +56,7 @@ inline std::vector<double> with_noise(std::vector<double> sound, double deviatio
   return sound;
 }
 
-// To `bits`, the peak at 0.9 of full scale.
+// Quantises to `bits` with the peak at 0.9 of full scale.
 inline std::vector<double> quantised(std::vector<double> sound, int bits) {
   const double scale = 0.9 * (std::pow(2.0, bits - 1) - 1.0) / peak_of(sound);
   for (double& x : sound) {
@@ -66,7 +65,7 @@ inline std::vector<double> quantised(std::vector<double> sound, int bits) {
   return sound;
 }
 
-// What a thing of metal may have: the higher the shorter, 0 to 30 dB below the loudest.
+// Modes typical of a metal object: higher ones decay faster; 0 to 30 dB below the loudest.
 inline std::vector<KnownMode> random_modes(Random& random, std::size_t count, double low_hz,
                                            double high_hz, double least_distance_hz) {
   std::vector<KnownMode> modes;
@@ -86,7 +85,7 @@ inline std::vector<KnownMode> random_modes(Random& random, std::size_t count, do
   return modes;
 }
 
-// How far off what was found is; both by frequency, of one channel, the modes' phases at the start.
+// Errors of the identified modes; both lists by frequency, one channel, phases at the start.
 struct Misses {
   double frequency_hz = 0.0;
   double t60_percent = 0.0;

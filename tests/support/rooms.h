@@ -1,4 +1,4 @@
-// tests: what is tested is found by its name alone, whichever room it is of.
+// tests: makes the names of all rooms visible.
 #pragma once
 
 #include "app/rooms.h"

@@ -1,4 +1,4 @@
-// tests: solids as text, made here and by nothing of ours.
+// tests: solids as text, made here independently of the project.
 #pragma once
 
 #include <array>
@@ -16,8 +16,8 @@
 
 namespace ressort::support {
 
-// An icosahedron's faces cut in four, `times` times, and drawn onto a sphere: 12, 42, 162, 642
-// points. With the sphere's own volume, or with its points on the sphere.
+// An icosahedron subdivided `times` times and projected onto a sphere: 12, 42, 162, 642 points;
+// with the sphere's volume, or with its points on the sphere.
 inline Surface icosphere(int times, double radius, bool has_true_volume) {
   const double t = std::numbers::phi;
   Surface surface;
@@ -81,7 +81,7 @@ inline Surface box_surface(const Point3& sides, const Point3& corner = {}) {
   return surface;
 }
 
-// What turns around the z axis: from (r, z) to (r, z), closed; r may be 0 at both ends.
+// A solid of revolution around the z axis with the profile (r, z); r may be 0 at both ends.
 inline Surface revolved(const std::vector<std::array<double, 2>>& profile, int steps) {
   Surface surface;
   std::vector<std::vector<int>> rings;

@@ -1,4 +1,4 @@
-// Bodies: modes by frequency and decay, and places on them that move by weights of all modes.
+// Bodies: modes given by frequency and decay, and places that move by weights of all modes.
 
 #include <complex>
 #include <numbers>
@@ -25,8 +25,8 @@ std::string digits(double value) {
   return print_number(value);
 }
 
-// The pole of a mode that swings alone, from samples: x'' = a x' - b x, by least squares, of every
-// so manyth sample.
+// Estimates the pole of a single mode from samples: x'' = a x' - b x, by least squares over every
+// `stride`th sample.
 std::complex<double> pole_of(const std::vector<double>& x, std::size_t stride) {
   Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
   Eigen::Vector2d right = Eigen::Vector2d::Zero();
@@ -73,8 +73,8 @@ TEST_CASE("a mode has its frequency and its T60 at every rate", "[bodies]") {
 }
 
 TEST_CASE("a T60 parameter sets a mode's decay with exact modes at any pitch", "[bodies]") {
-  // two modes, the second of which lasts `ring` times half a second: from 0.5 s at first to 1.5 s;
-  // K = M (w^2 + s^2), s = ln 1000/T60, so a factor of 9 of it is some three times the frequency
+  // Two modes. The second one's T60 is `ring` times 0.5 s, and changes from 0.5 s to 1.5 s. K = M
+  // (w^2 + s^2) with s = ln 1000/T60, so a factor of 9 on it triples the frequency.
   const std::string text =
       "@ring param 1.\n@b body 2. p q\n@b1 mode @b 400. 2. 1. 0.\n"
       "@b2 mode @b 1100. 0.5*ring 0. 1.\n@in1 frcInput [@b q]\n@out1 posOutput [@b q]\n";
@@ -101,8 +101,8 @@ TEST_CASE("a T60 parameter sets a mode's decay with exact modes at any pitch", "
 }
 
 TEST_CASE("a mode's first sample equals its weights times the force", "[bodies]") {
-  // a push of 1 at a place of weight 0.5 moves a mode of mass 4 by 0.5/4, and a place of -2 by -2
-  // times that
+  // A unit force at a place of weight 0.5 moves a mode of mass 4 by 0.5/4, and a place of weight -2
+  // by -2 times that.
   const std::string text =
       "@b body 4. hit heard\n@b1 mode @b 500. 1. 0.5 -2.\n@in1 frcInput [@b hit]\n"
       "@out1 posOutput [@b heard]\n";
@@ -110,7 +110,8 @@ TEST_CASE("a mode's first sample equals its weights times the force", "[bodies]"
 }
 
 TEST_CASE("an overdamped mode has two real poles at any decay time", "[bodies]") {
-  // x'' + z x' + k x = 0 has e^-(z/2 -+ sqrt(z^2/4 - k)); (1 - p)(1 - q) = K, 1 - p q = Z.
+  // x'' + z x' + k x = 0 has the poles e^-(z/2 -+ sqrt(z^2/4 - k)); (1 - p)(1 - q) = K, 1 - p q =
+  // Z.
   for (const double z : {0.1, 3.0, 800.0, 1600.0, 1e4, 1e9}) {
     for (const double k : {1e-6 * z * z, 0.2 * z * z}) {
       const double root = std::sqrt(0.25 * z * z - k);
@@ -125,7 +126,7 @@ TEST_CASE("an overdamped mode has two real poles at any decay time", "[bodies]")
 }
 
 TEST_CASE("a mode above the Nyquist frequency responds with its static compliance", "[bodies]") {
-  // k = (2 pi 30000 / 44100)^2 per sample and unit of mass
+  // k = (2 pi 30000 / 44100)^2 per sample and unit mass.
   const std::string text =
       "@b body 2. p\n@b1 mode @b 30000. 1. 0.5\n@in1 frcInput [@b p]\n@out1 posOutput [@b p]\n";
   const double alpha = 3.0 * std::numbers::ln10 / 44100.0;
@@ -177,8 +178,8 @@ TEST_CASE("the reference simulator plays bodies alike", "[bodies]") {
   CHECK(worst < 1e-11 * loudest);
 }
 
-// A string of n masses 1 between walls as a body: its modes' shapes are sines, and the scheme's
-// poles of K and Z give their frequency and decay.
+// A string of n unit masses between walls as a body: its mode shapes are sines, and the scheme's
+// poles for K and Z give frequency and decay.
 TEST_CASE("a string and its own modes sound alike under a hammer", "[bodies]") {
   constexpr int n = 12;
   constexpr double k = 0.3;
@@ -199,7 +200,7 @@ TEST_CASE("a string and its own modes sound alike under a hammer", "[bodies]") {
     return "@h mass 2. 0.5 -4410.\n@hit contact " + b + " @h 0.02 0.001\n@out1 posOutput " + a +
            "\n@out2 posOutput @h\n";
   };
-  // the string's fourth mass is at 4/13 of its length
+  // The string's fourth mass is at 4/13 of its length.
   const std::string a4 = "[@s " + digits(4.0 / (n + 1)) + "]";
   const std::string a9 = "[@s " + digits(9.0 / (n + 1)) + "]";
   Bare<double> masses(make_program(network_of(string + rest(a4, a9)), 44100.0, true));
@@ -218,8 +219,8 @@ TEST_CASE("a string and its own modes sound alike under a hammer", "[bodies]") {
 
 namespace {
 
-// The step of a random hybrid as a matrix, by its definition and nothing of the project's: masses
-// 1..., springs and dampers between masses, places and walls, all times a factor.
+// The step of a random hybrid as a matrix, from its definition and without the project's code:
+// masses, springs and dampers between masses, places and walls, all scaled by a factor.
 struct Hybrid {
   explicit Hybrid(std::uint64_t seed) {
     Random random(seed);
@@ -319,7 +320,7 @@ struct Hybrid {
     }
     return low;
   }
-  // The largest root of the step: v += -(K x + Z v)/M, x += v
+  // Returns the largest root of the step v += -(K x + Z v)/M, x += v.
   double largest_root(double factor) const {
     Eigen::MatrixXd stiffness = factor * k;
     stiffness.diagonal() += own_k;
@@ -348,7 +349,7 @@ struct Hybrid {
   Eigen::MatrixXd z;
 };
 
-// Hybrids 1 % below and above their limit; returns how many the proof misjudged.
+// Tests hybrids 1 % below and above their limit; returns how many the proof misjudged.
 int misjudged(std::uint64_t first, int count) {
   int wrong = 0;
   for (int i = 0; i < count; ++i) {
@@ -359,7 +360,7 @@ int misjudged(std::uint64_t first, int count) {
       const auto values = parameter_values(network);
       const bool is_stable = Stability(network, 1.0).prove({values, values}) == Verdict::stable;
       const double root = hybrid.largest_root(share * limit);
-      const bool grows = root > 1.0 + 1e-6;  // free masses have a double root of 1
+      const bool grows = root > 1.0 + 1e-6;  // Free masses have a double root of 1.
       if (is_stable != (share < 1.0) || grows != (share > 1.0)) {
         WARN("seed " << first + static_cast<std::uint64_t>(i) << " at " << share
                      << " of its limit: root " << root);

@@ -1,4 +1,4 @@
-// What a preset calls fixed: keys tune the string, and leave the box as it is.
+// Fixed parts of a preset: keys tune the string and leave the body unchanged.
 #include "core/compile/compile.h"
 #include "core/model/preset/fit.h"
 #include "tests/support/harness.h"
@@ -11,8 +11,8 @@ using namespace support;
 
 constexpr double rate_hz = 44100.0;
 
-// A string of 22 masses, tied to a box of three modes among the keys; right at one of them a key
-// would sound as two, a wolf.
+// A string of 22 masses, tied to a body with three modes between the keys. A key at one of these
+// modes would have a split pitch (a wolf note).
 const std::string guitar =
     "@s string 24 1. 0.05 0.0002 0. 0.\n"
     "@box body 4000. bridge top\n"
@@ -32,7 +32,7 @@ Preset preset_of(const std::string& fixed) {
   return parsed.preset;
 }
 
-// Output 1 and 2 of a note.
+// Returns outputs 1 and 2 of a note.
 std::vector<std::vector<double>> note(int key, const Preset& preset) {
   auto compiled = compile_network(network_of(guitar), preset, {});
   REQUIRE(compiled);
@@ -61,7 +61,7 @@ TEST_CASE("keys tune a string on a fixed body", "[fixed]") {
 }
 
 TEST_CASE("a fixed body keeps its modes at every key", "[fixed]") {
-  // 100 Hz is far from what these keys and their partials are
+  // 100 Hz is far from these keys and their partials.
   for (const int key : {57, 64}) {
     const auto level_at = [&](const Preset& preset, double hz) {
       const std::vector<double> sound = note(key, preset)[1];

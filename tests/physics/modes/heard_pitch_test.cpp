@@ -1,5 +1,5 @@
-// The pitch of shipped presets as `play` makes them, by nothing but their sound; and that a cent
-// beside it is told from it.
+// Measures the pitch of shipped presets as `play` plays them, from the sound only, and verifies
+// that the measurement detects a deviation of one cent.
 #include "app/realtime/denormals.h"
 #include "app/session/admit.h"
 #include "app/session/loader.h"
@@ -12,7 +12,8 @@ namespace {
 using support::note_on;
 using support::Player;
 
-// How many cents a key's partial is heard above the key, bent by so many.
+// Returns the deviation of a key's partial from the key in cents, with the key bent by
+// `bent_cents`.
 double heard_cents(const std::string& name, double rate_hz, int key, double bent_cents) {
   const DenormalsFlushed flushed;
   const auto scene = load_scene(name, {});
@@ -23,10 +24,10 @@ double heard_cents(const std::string& name, double rate_hz, int key, double bent
   const int transpose = made->instrument.transpose;
   const double wanted_hz = 440.0 * std::exp2((key + transpose - 69) / 12.0);
   Player player(*std::move(made));
-  // A Hann window's peak is two bins wide on either side, which shall be more than a few cents.
+  // A Hann window's main lobe is two bins wide on either side, which must exceed a few cents.
   const double seconds = std::min(1.0 + 60.0 / wanted_hz, 800.0 / wanted_hz);
   const auto first = static_cast<std::size_t>(0.1 * rate_hz);
-  const double semitones = 2.0;  // the wheel's range
+  const double semitones = 2.0;  // Range of the pitch wheel.
   player.run(first + static_cast<std::size_t>(seconds * rate_hz),
              {{.kind = EventKind::bend, .value = bent_cents / (100.0 * semitones)},
               note_on(0, key, 100.0 / 127.0)});
@@ -59,7 +60,7 @@ TEST_CASE("shipped instruments sound within a cent of their keys' pitch", "[hear
   }
 }
 
-// Whatever is tuned and rings at its small pitch.
+// All presets that are tuned by keys and ring at small amplitudes.
 TEST_CASE("all instruments sound in tune over the keyboard at three rates",
           "[.][heard_pitch_everywhere]") {
   for (const double rate_hz : {44100.0, 48000.0, 96000.0}) {

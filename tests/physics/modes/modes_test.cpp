@@ -1,5 +1,5 @@
-// The modes that are told of a network against those that its sound has: poles and levels found in
-// nothing but the samples that the direct form renders. Needs Eigen.
+// Compares the reported modes of a network with those of its sound: poles and levels estimated from
+// the samples of the direct form only. Needs Eigen.
 #include <chrono>
 #include <numbers>
 
@@ -14,9 +14,9 @@ using namespace support;
 
 namespace {
 
-// Chains, meshes, random graphs, strings with places on them and strings that share a mass, of
-// masses, springs and dampers that nothing relates: damping is not proportional. Every mass is
-// heard, the first output is somewhere within, and one input pushes another mass.
+// Chains, meshes, random graphs, strings with places, and strings that share a mass, with unrelated
+// masses, springs and dampers, so that damping is not proportional. Every mass is an output, the
+// first output is an inner mass, and one input drives another mass.
 class RandomText {
  public:
   explicit RandomText(std::uint64_t seed) : random_(seed + 1) {
@@ -56,7 +56,7 @@ class RandomText {
         ground(0);
         break;
       }
-      case 3: {  // a string whose places hold masses
+      case 3: {  // A string whose places carry masses.
         const std::size_t nodes = 5 + random_.below(12);
         text_ += "@s string " + std::to_string(nodes) + " " + number(0.6, 2.0) + " " +
                  number(0.03, 0.3) + " " + number(1e-4, 2e-3) + " 0. 0.\n";
@@ -72,7 +72,7 @@ class RandomText {
         }
         break;
       }
-      default: {  // two chains that share a mass
+      default: {  // Two chains that share a mass.
         const std::size_t first = masses(3 + random_.below(8));
         const std::size_t count = masses(2 + random_.below(8));
         for (std::size_t i = 0; i + 1 < first; ++i) {
@@ -129,16 +129,17 @@ class RandomText {
 
 struct Heard {
   Pole pole;
-  std::vector<double> levels;  // [input] at the first output, at the time of the impulse
+  std::vector<double> levels;  // [input] At the first output, at the time of the impulse.
 };
 
-// What is in the sounds of impulses at every mass: the poles of the recurrence that takes two
-// samples of every output to the next, by least squares over all samples, and how much of each is
-// in the first output.
+// Estimates the modes from the responses to impulses at every mass: the poles of the recurrence
+// from two samples of all outputs to the next, by least squares over all samples, and their
+// amplitudes at the first output.
 std::vector<Heard> listen(const Program& program, double rate_hz) {
   constexpr Eigen::Index frames = 1500;
   const auto ends = static_cast<Eigen::Index>(program.outputs.size());
-  const double impulse = Network::reference_rate_hz / rate_hz;  // as the engine feeds an input
+  // Scaled as the engine scales an input.
+  const double impulse = Network::reference_rate_hz / rate_hz;
   Eigen::MatrixXd before(frames * ends, 2 * ends);
   Eigen::MatrixXd after(frames * ends, 2 * ends);
   Eigen::MatrixXd sound(frames, ends);
@@ -187,7 +188,7 @@ std::vector<Heard> listen(const Program& program, double rate_hz) {
   return heard;
 }
 
-// How far the modes told are from those heard, at worst.
+// Worst differences between reported and measured modes.
 struct Off {
   double hertz = 0.0;
   double t60_share = 0.0;
@@ -224,7 +225,7 @@ void compare(std::uint64_t seed, Off& off) {
     for (std::size_t input = 0; input < loudest.size(); ++input) {
       const double level = mode.levels[input * found->outputs];
       const double there = heard[i].levels[input];
-      if (there > 1e-6 * loudest[input]) {  // nobody hears what is 120 dB below
+      if (there > 1e-6 * loudest[input]) {  // Levels 120 dB below the loudest are inaudible.
         const double db = std::fabs(20.0 * std::log10(level / there));
         INFO("from input " << input + 1 << " " << level << ", heard " << there);
         off.level_db = std::max(off.level_db, db);
@@ -286,12 +287,12 @@ TEST_CASE("position inputs and force outputs have modal levels", "[modes]") {
         }
         for (Eigen::Index m = 0; m < 3; ++m) {
           const std::complex<double> z = 1.0 + found->modes[static_cast<std::size_t>(m)].mu;
-          // A hand is where it is as the masses have stepped; a force pushes them in that step.
+          // A position input acts after the masses have stepped; a force acts within the step.
           partials(n, m) = std::pow(z, static_cast<double>(n + 1) + static_cast<double>(input));
           partials(n, m + 3) = std::conj(partials(n, m));
         }
       }
-      // The first samples hear the hand itself.
+      // The first samples contain the input itself.
       const Eigen::Index rest = frames - 4;
       const Eigen::MatrixXcd there = sound.bottomRows(rest).cast<std::complex<double>>();
       const Eigen::MatrixXcd shares = support::least_squares(partials.bottomRows(rest), there);
@@ -310,7 +311,7 @@ TEST_CASE("position inputs and force outputs have modal levels", "[modes]") {
 
 namespace {
 
-// Of a rectangle of fixed border, k of M = 1 is known in closed form.
+// For a rectangle with a fixed border, k for M = 1 is known in closed form.
 void check_mesh(std::size_t rows, std::size_t columns, std::size_t count, double z) {
   constexpr double stiffness = 0.2;
   const Network network =
@@ -375,7 +376,7 @@ TEST_CASE("outputs of equal number are summed", "[modes]") {
 
 TEST_CASE("the lowest modes of a large mesh include degenerate ones", "[modes]") {
   check_mesh(42, 50, 40, 0.001);
-  check_mesh(45, 45, 60, 0.0);  // every second one has a twin
+  check_mesh(45, 45, 60, 0.0);  // Every second mode is degenerate.
 }
 
 TEST_CASE("a hundred modes of a hundred thousand masses", "[.][modes_everywhere]") {
@@ -383,7 +384,7 @@ TEST_CASE("a hundred modes of a hundred thousand masses", "[.][modes_everywhere]
 }
 
 TEST_CASE("modes with non-proportional damping are found in small and large networks", "[modes]") {
-  // The same string searched through all of it and from below.
+  // The same string, solved completely and from the lowest mode upwards.
   std::string text =
       "@s string 220 1. 0.2 0.0002 0. 0.\n@o osc 3. 0.01 0.02 0. 0.\n"
       "@l springDamper @o [@s 0.31] 0.05 0.03\n@in1 frcInput [@s 0.1]\n"
@@ -393,7 +394,7 @@ TEST_CASE("modes with non-proportional damping are found in small and large netw
   REQUIRE(all);
   CHECK(all->is_all);
   CHECK(!all->is_proportional);
-  // Two of the same beside it that nothing touches: too many to search through.
+  // Two more unconnected copies make it too large for the complete solution.
   const Network large = network_of(text + "@t string 2100 1. 0.2 0.0002 0. 0.\n");
   const auto lowest = find_modes(large, {}, {.count = 120});
   INFO((lowest ? "" : lowest.error().message));
@@ -420,10 +421,10 @@ TEST_CASE("overdamped motions are not listed as modes", "[modes]") {
     REQUIRE(found);
     return found->modes.size();
   };
-  CHECK(count("@m0 mass 1. 0. 0.\n@out1 posOutput @m0\n") == 0);  // drifts
+  CHECK(count("@m0 mass 1. 0. 0.\n@out1 posOutput @m0\n") == 0);  // Drifts.
   CHECK(count("@m0 mass 1. 0. 0.\n@m1 mass 1. 0. 0.\n@l springDamper @m0 @m1 0.1 0.001\n"
-              "@out1 posOutput @m0\n") == 1);                               // drifts and swings
-  CHECK(count("@m0 osc 1. 0.0001 0.5 0. 0.\n@out1 posOutput @m0\n") == 0);  // creeps back
+              "@out1 posOutput @m0\n") == 1);  // Drifts and oscillates.
+  CHECK(count("@m0 osc 1. 0.0001 0.5 0. 0.\n@out1 posOutput @m0\n") == 0);  // Overdamped.
   CHECK(count("@g ground 0.\n@out1 posOutput @g\n") == 0);
   CHECK(!find_modes(network_of("@p param 0.\n@m0 mass p 0. 0.\n@out1 posOutput @m0\n"),
                     std::vector<double>{0.0}, {}));

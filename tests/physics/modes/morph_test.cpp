@@ -1,5 +1,5 @@
-// A way through several presets: each stop sounds as it does by itself, numbers between go as they
-// should, and whatever moves, the pitch stays.
+// A morph through several presets: each stop sounds like the preset, numbers between stops follow
+// their law, and the pitch stays constant.
 #include "core/model/morph.h"
 
 #include <array>
@@ -26,7 +26,7 @@ Scene scene_of_preset(const std::string& name) {
   return *std::move(scene);
 }
 
-// A string in air and on a damper, heard at a place: everything of it moves.
+// A string with air loss and a damper, whose parameters and places all change.
 const char* const string_text =
     "@K param 0.1\n@Q param 0.3\n@Z param 0.0008\n@A param 0.00002\n@M param 1.\n"
     "@s string 24 M K Z 0. 0.\n@g ground 0.\n@air damper @g [@s 0.5] A\n"
@@ -102,8 +102,8 @@ Played played(const Scene& scene, double seconds, const std::vector<Event>& even
   return out;
 }
 
-// Of a morph that goes on from one sample to the next there is nothing in the sixth difference but
-// the little that the highest partials leave there; a step of 1 leaves 20.
+// The sixth difference of a smooth morph contains only a little of the highest partials; a step of
+// 1 contributes 20.
 double largest_sixth_difference(std::vector<double> y) {
   for (int order = 0; order < 6; ++order) {
     for (std::size_t n = 0; n + 1 < y.size(); ++n) {
@@ -177,7 +177,7 @@ TEST_CASE("each stop of a morph sounds as its preset does", "[morph]") {
   for (const char* name : {"Vibraphone", "Celesta", "Glockenspiel"}) {
     Scene alone = scene_of_preset(name);
     stop += 1.0;
-    // Struck alike, at the same pitch.
+    // Struck alike at the same pitch.
     alone.preset.controls = morph.preset.controls;
     std::erase_if(alone.preset.controls,
                   [](const ControlSetting& one) { return one.source != ControlSource::note; });
@@ -196,7 +196,7 @@ TEST_CASE("each stop of a morph sounds as its preset does", "[morph]") {
         off = std::max(off, std::fabs(found[c][n] - expected[c][n]));
       }
       INFO(name << ", channel " << c << ": " << off / peak(expected[c]));
-      // What its own key table and the morph's have in common: cents of a grid of semitones.
+      // Its own key table and the morph's differ by the interpolation between semitones.
       CHECK(off < 1e-4 * peak(expected[c]));
     }
   }
@@ -261,7 +261,7 @@ TEST_CASE("T60 changes by equal ratios between stops with any damping", "[morph]
     INFO(way << ": " << t60(1.0 + way) << " s");
     CHECK(t60(1.0 + way) == Approx(std::pow(first, 1.0 - way) * std::pow(last, way)).epsilon(1e-3));
   }
-  // Without, it would be far off: 22 % at the middle.
+  // Without the correction the error is 22 % in the middle.
   const Network network = network_of(string_text);
   Scene plain = scene;
   plain.network = *morphed(network, stops_of(network, 2), "t", {});

@@ -1,5 +1,5 @@
-// Random structures brought to a random note and decay, judged by the sound: rendered by the
-// published scheme, and its poles found by ESPRIT, which knows nothing of the model.
+// Random structures tuned to a random note and decay, judged by the sound: rendered by the
+// published scheme and analysed by ESPRIT, independent of the model.
 #include <cmath>
 #include <numbers>
 
@@ -18,7 +18,8 @@ namespace {
 
 constexpr double rate_hz = 44100.0;
 
-// One of the six, of any size, material and decay; heard and struck where few modes have a node.
+// One of six structures with random size, material and decay, struck and heard where few modes have
+// a node.
 std::string random_structure(Random& random, std::size_t kind) {
   const auto number = [&](double low, double high) {
     return " " + show(std::exp(random.uniform(std::log(low), std::log(high))));
@@ -36,7 +37,7 @@ std::string random_structure(Random& random, std::size_t kind) {
       "@s closedMesh" + size + material + end,
       "@s cornerMesh" + size + material + end};
   const std::string across = kind < 3 ? "" : " 0.37";
-  // Chains and meshes of their own would fly off.
+  // Free chains and meshes would drift away.
   const bool is_free = kind == 1 || kind == 3;
   return structures[kind] +
          (is_free ? "@g ground 0.\n@h spring @g [@s 0." + across + "] 0.02 0.00001\n" : "") +
@@ -65,7 +66,7 @@ TEST_CASE("a structure tuned to a note and a decay sounds with both", "[notes_he
     const auto modes = find_modes(network, values, {.count = 8});
     REQUIRE(modes);
     std::size_t mode = 0;
-    while (modes->modes[mode].frequency_hz < 10.0) {  // a way to move as a whole
+    while (modes->modes[mode].frequency_hz < 10.0) {  // A rigid-body motion.
       ++mode;
     }
     const double near_hz = modes->modes[mode].frequency_hz * random.uniform(0.75, 1.33);

@@ -1,4 +1,4 @@
-// IR-T8: what a network sounds like, recorded, has the network's modes.
+// IR-T8: the modes identified from a network's sound equal the network's modes.
 #include "core/identification/identify.h"
 #include "tests/support/harness.h"
 #include "tests/support/ringing.h"
@@ -9,7 +9,7 @@ using namespace support;
 
 namespace {
 
-// A string of `count` masses between two grounds, struck by a force of 1 at one and heard at
+// A string of `count` masses between two grounds, struck by a unit force at one and heard at
 // another.
 std::string string_model(int count, double mass, double stiffness, double damping, int hit,
                          int heard) {
@@ -39,13 +39,13 @@ TEST_CASE("IR-T8: the modes of a string's sound are those of the string", "[reco
   const double stiffness = random.uniform(0.02, 0.2) * mass;
   const double damping = random.uniform(0.0005, 0.002) * mass;
   const int hit = 0;
-  const int heard = count - 1;  // no mode has a node at an end
+  const int heard = count - 1;  // No mode has a node at an end.
   Bare<double> string(program_of(string_model(count, mass, stiffness, damping, hit, heard)));
   std::vector<double> sound;
   for (int n = 0; n < 44100; ++n) {
     sound.push_back(string.step({n == 0 ? 1.0 : 0.0})[0]);
   }
-  // In closed form: mode k has 4 K/M sin^2(k pi / 2(N+1)), and the same of Z.
+  // Closed form: mode k has 4 K/M sin^2(k pi / 2(N+1)), and the same for Z.
   std::vector<KnownMode> known;
   for (int k = 1; k <= count; ++k) {
     const double sine = std::sin(k * std::numbers::pi / (2.0 * (count + 1)));
@@ -61,7 +61,7 @@ TEST_CASE("IR-T8: the modes of a string's sound are those of the string", "[reco
   for (std::size_t k = 0; k < known.size(); ++k) {
     INFO(known[k].frequency_hz << " Hz, " << known[k].t60_s << " s");
     const Misses miss = miss_of(known[k], found.modes[k], 0.0);
-    CHECK(miss.frequency_hz < 1e-6);  // wanted: 0.01 Hz, 0.1 %
+    CHECK(miss.frequency_hz < 1e-6);  // Required: 0.01 Hz, 0.1 %.
     CHECK(miss.t60_percent < 1e-5);
   }
 }

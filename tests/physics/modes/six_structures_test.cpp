@@ -1,5 +1,5 @@
-// Six structures on one pitch and one decay, and the mixes of the paper's patch: judged by what is
-// heard, with the paper's table written down here.
+// Six structures with one pitch and one decay, and the mixes of the paper's patch, judged by the
+// sound and with the paper's table written in this file.
 #include <array>
 #include <cmath>
 #include <fstream>
@@ -36,7 +36,7 @@ Preset preset() {
   return parsed.preset;
 }
 
-// What is heard of one structure, or of all.
+// The sound of one structure, or of all.
 struct Heard {
   int only = -1;
   bool has_levels = true;
@@ -46,7 +46,7 @@ struct Heard {
 std::vector<double> played(const Heard& heard, double seconds, const std::vector<Event>& events) {
   Network network = network_of(text_of("/models/SixStructures.mdl"));
   REQUIRE(network.outputs.size() == 2 * structures);
-  network.outputs.resize(structures);  // the left ear's
+  network.outputs.resize(structures);  // The left channel.
   if (!heard.has_levels) {
     for (Output& output : network.outputs) {
       output.level = no_argument;
@@ -56,7 +56,7 @@ std::vector<double> played(const Heard& heard, double seconds, const std::vector
     network.outputs = {network.outputs[static_cast<std::size_t>(heard.only)]};
   }
   Preset quick = preset();
-  quick.tuned_along.clear();  // which takes a while to find, and is not asked for
+  quick.tuned_along.clear();  // Takes long and is not needed here.
   auto compiled = compile_network(network, quick, {.rate_hz = heard.rate_hz});
   REQUIRE(compiled);
   std::vector<double> sound(static_cast<std::size_t>(seconds * heard.rate_hz));
@@ -118,11 +118,11 @@ TEST_CASE("T60 is reached and moves the pitch by less than 0.05 cents", "[six_st
   Network network = network_of(text_of("/models/SixStructures.mdl"));
   network.outputs.resize(structures);
   for (std::size_t i = 0; i < structures; ++i) {
-    network.outputs[i].number = static_cast<int>(i) + 1;  // each by itself
+    network.outputs[i].number = static_cast<int>(i) + 1;  // One output per structure.
     network.outputs[i].level = no_argument;
   }
   for (const double asked_s : {0.2, 0.37, 1.0, 2.0, 10.0}) {
-    // Stretches that are long enough to keep other partials away, and no longer than the sound.
+    // Windows long enough to exclude other partials and no longer than the sound.
     const double length_s = asked_s < 1.0 ? 0.11 : 1.0;
     const int key = asked_s < 1.0 ? 69 : 57;
     const double hz = 440.0 * std::exp2((key - 69) / 12.0);
@@ -145,7 +145,8 @@ TEST_CASE("T60 is reached and moves the pitch by less than 0.05 cents", "[six_st
   }
 }
 
-// Turned while it sounds, and low, where dampers flatten the most: 3 cents at 55 Hz without.
+// T60 changes while low notes sound, where dampers flatten most: 3 cents at 55 Hz without
+// correction.
 TEST_CASE("keys stay in tune while T60 changes", "[six_structures]") {
   const int t60 = index_of("t60");
   const auto found_at = [&](bool is_tuned) {
@@ -191,7 +192,7 @@ TEST_CASE("the test detects 0.01 cents and 0.1 % of a decay", "[six_structures]"
   CHECK(found.t60_s == Approx(3.0036).epsilon(1e-5));
 }
 
-// The patch's gains, 128 being 0 dB and a step 0.6 dB.
+// Gains of the patch; 128 is 0 dB and a step is 0.6 dB.
 TEST_CASE("mixes 1 to 6 equal the stored ones, linear in dB in between", "[six_structures]") {
   constexpr double table[6][structures] = {
       {107, 100, 36, 113, 36, 36}, {42, 69, 106, 106, 128, 106}, {30, 74, 129, 95, 95, 113},
@@ -212,8 +213,7 @@ TEST_CASE("mixes 1 to 6 equal the stored ones, linear in dB in between", "[six_s
   }
 }
 
-// All six as one: nowhere do they fade away, as straight lines of dB from an extreme to the next
-// do.
+// All six together: the sound fades nowhere, unlike with straight lines of dB between extremes.
 TEST_CASE("a key is audible at every mix", "[six_structures]") {
   const int timbre = index_of("timbre");
   const auto at = [&](double position) {
@@ -222,12 +222,12 @@ TEST_CASE("a key is audible at every mix", "[six_structures]") {
   const double loud = at(1.0);
   for (double position = 1.25; position <= 12.0; position += 0.25) {
     INFO(position << ": " << 20.0 * std::log10(at(position) / loud) << " dB");
-    CHECK(at(position) > 0.4 * loud);  // the patch's own third and sixth are 4 dB softer
+    CHECK(at(position) > 0.4 * loud);  // The patch's own third and sixth mix are 4 dB softer.
   }
 }
 
-// Each figure of the frame at 0.33 s of A3, as `describe --at 14400` has it: no other mix of the
-// six structures, from 0 to -60 dB of the loudest, goes beyond the extreme.
+// Each descriptor of the frame at 0.33 s of A3, as `describe --at 14400` computes it: no other mix
+// of the six structures, from 0 to -60 dB of the loudest, exceeds the extreme.
 TEST_CASE("mixes 7 to 12 have the extrema of six descriptors", "[six_structures]") {
   constexpr double rate_hz = 44100.0;
   constexpr std::size_t size = 2048;
@@ -268,7 +268,7 @@ TEST_CASE("mixes 7 to 12 have the extrema of six descriptors", "[six_structures]
   };
   struct Extreme {
     const char* name;
-    double (*of)(const SpectralShape& shape);  // which is the largest there
+    double (*of)(const SpectralShape& shape);  // The descriptor that has its maximum at this mix.
   };
   const Extreme extremes[] = {
       {"centroid", [](const SpectralShape& shape) { return shape.centroid_hz; }},
@@ -318,7 +318,7 @@ TEST_CASE("mixes 7 to 12 have the extrema of six descriptors", "[six_structures]
 TEST_CASE("a sweep through the mixes keeps the pitch and has no steps", "[six_structures]") {
   constexpr double rate_hz = 48000.0;
   std::vector<Event> events = {controller(0, 1, 0.0), note_on(0, 45)};
-  for (int step = 1; step <= 127; ++step) {  // as a controller does it, in 5 s
+  for (int step = 1; step <= 127; ++step) {  // A controller sweep of 5 s.
     events.push_back(
         controller(static_cast<std::uint32_t>(step * 5.0 * rate_hz / 127.0) - 1, 1, step / 127.0));
   }
@@ -330,8 +330,7 @@ TEST_CASE("a sweep through the mixes keeps the pitch and has no steps", "[six_st
   }
   const double peak = peak_of(all);
   for (int i = 0; i < static_cast<int>(structures); ++i) {
-    // What a level does from one sample to the next is what is left when the structure's own motion
-    // has been taken away.
+    // Removing the structure's own motion leaves the change of level from sample to sample.
     const std::vector<double> swept = played({.only = i}, 5.5, events);
     const std::vector<double> plain = played({.only = i, .has_levels = false}, 5.5, events);
     double worst = 0.0;

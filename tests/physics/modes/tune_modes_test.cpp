@@ -1,5 +1,5 @@
-// Modes brought to where somebody wants them, and networks made of modes. What came of it is judged
-// by modes of what is written, which modes_test.cpp holds to the sound.
+// Modes tuned to targets, and networks made from modes. The results are judged by the modes of the
+// printed model; modes_test.cpp verifies those against the sound.
 #include <cmath>
 #include <numbers>
 
@@ -26,12 +26,13 @@ NetworkModes modes_of(const Network& network, const ModeOptions& options = {}) {
   return *std::move(found);
 }
 
-// As it is read from what is written.
+// Prints and parses the network.
 Network again(const Network& network) {
   return network_of(print_network(network));
 }
 
-// Masses held and joined at random, each spring by itself; pushed at the first, heard at the last.
+// Masses held and joined at random, with individual springs; driven at the first, heard at the
+// last.
 std::string random_text(std::uint64_t seed, std::size_t count) {
   Random random(seed + 100);
   const auto number = [&](double low, double high) { return show(random.uniform(low, high)); };
@@ -61,7 +62,7 @@ const std::string two_strings =
     "@in1 frcInput [@a 0.3]\n@in2 frcInput [@b 0.4]\n@out1 posOutput [@a 0.6]\n"
     "@out2 posOutput [@b 0.7]\n";
 
-// How a body of modes answers an impulse at one place at another, by each mode's own recurrence.
+// The response of a body at one place to an impulse at another, by each mode's recurrence.
 std::vector<double> played(const PlacedModes& modes, std::size_t from, std::size_t to,
                            std::size_t frames, double rate_hz) {
   std::vector<double> sound(frames, 0.0);
@@ -89,7 +90,7 @@ TEST_CASE("a mode of a model or a part is tuned to a note and a decay", "[tune_m
     for (const char* const part : {"", "a"}) {
       INFO("times " << factor << ", part '" << part << "'");
       const NetworkModes before = modes_of(network);
-      // The lowest mode that the part has is found by who hears it.
+      // The part's lowest mode is the lowest with a level at its output.
       std::size_t mode = 0;
       while (before.modes[mode].levels[0] < 1e-9) {
         ++mode;
@@ -125,7 +126,7 @@ TEST_CASE("impossible tunings report the reason", "[tune_modes]") {
   };
   CHECK(message({.mode = 500, .frequency_hz = 200.0}).find("there is no mode 501") == 0);
   CHECK(message({.mode = 0, .frequency_hz = 200.0, .part = "x"}).find("expected the name") == 0);
-  // The lowest mode is of one string; the other's springs do nothing to it.
+  // The lowest mode belongs to one string; the other's springs do not affect it.
   const NetworkModes modes = modes_of(network);
   const std::string other = modes.modes[0].levels[0] > 1e-9 ? "b" : "a";
   CHECK(message({.mode = 0, .frequency_hz = 200.0, .part = other}).find("hardly") !=
@@ -176,14 +177,14 @@ TEST_CASE("a decay law applies to any structure", "[tune_modes]") {
     const Network dressed = again(with_decay(network_of(text), *law));
     std::size_t heard = 0;
     for (const NetworkMode& mode : modes_of(dressed, {.scheme = ModeScheme::continuous}).modes) {
-      // f^2 is that without dampers, which the pole's is but for (a + b f^2)^2 / 4 pi^2.
+      // f is the undamped frequency; the pole's differs by (a + b f^2)^2 / 4 pi^2.
       const double loss = 3.0 * std::numbers::ln10 / mode.t60_s;
       const double undamped_hz = std::hypot(mode.frequency_hz, loss / (2.0 * std::numbers::pi));
       CHECK(std::fabs(mode.t60_s / law->t60_s(undamped_hz) - 1.0) < 1e-8);
       ++heard;
     }
     CHECK(heard >= 15);
-    // As the published scheme plays it, the same to a hundredth where it is not near the rate.
+    // The published scheme agrees to 1 % far below the rate.
     for (const NetworkMode& mode : modes_of(dressed).modes) {
       if (mode.frequency_hz < 1000.0) {
         CHECK(std::fabs(mode.t60_s / law->t60_s(mode.frequency_hz) - 1.0) < 0.01);
@@ -193,12 +194,12 @@ TEST_CASE("a decay law applies to any structure", "[tune_modes]") {
   CHECK(!decay_law({}));
   CHECK(!decay_law({{100.0, 0.0}}));
   CHECK(!decay_law({{-1.0, 2.0}}));
-  // More loss below than above is none of the law's: a constant is nearest.
+  // The law cannot have more loss at low frequencies than at high ones; a constant is nearest.
   CHECK(decay_law({{100.0, 1.0}, {3000.0, 2.0}})->b == 0.0);
 }
 
 TEST_CASE("a network is played by its own body", "[tune_modes]") {
-  // Dampers in proportion, so that modes are real.
+  // Proportional dampers, so that modes are real.
   const auto law = decay_law({{100.0, 2.0}, {3000.0, 0.4}});
   for (std::uint64_t seed = 0; seed < 4; ++seed) {
     const double rate_hz = seed % 2 == 0 ? 44100.0 : 48000.0;
@@ -238,7 +239,8 @@ TEST_CASE("a chain's first mass responds like a place of a body", "[tune_modes]"
     double hz = 80.0;
     for (std::size_t i = 0; i < count; ++i) {
       hz *= random.uniform(1.02, 1.15);
-      // A decay that the chain's dampers can have: by the scheme's own k, which f^2 is near to.
+      // A decay that the chain's dampers can have, in terms of the scheme's k, which is close to
+      // f^2.
       const double k = 2.0 - 2.0 * std::cos(2.0 * std::numbers::pi * hz / 44100.0);
       const double f = 44100.0 / (2.0 * std::numbers::pi) * std::sqrt(k);
       body.modes.push_back({hz, law.t60_s(f), {random.uniform(-1.0, 1.0)}});

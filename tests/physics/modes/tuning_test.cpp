@@ -1,6 +1,6 @@
-// Keys and the pitch that sounds. Every tuned preset at three rates: at the stiffness that a key
-// gets, the published scheme's (z - 1)^2 M + z K + (z - 1) Z is singular next to the key's
-// frequency, found by inverse iterations with Eigen; and a render, by linear prediction.
+// The pitch of keys. For every tuned preset at three rates: at the stiffness of a key, the
+// published scheme's (z - 1)^2 M + z K + (z - 1) Z is singular at the key's frequency, found by
+// inverse iteration with Eigen; and a render is analysed by linear prediction.
 #include <Eigen/SparseLU>
 #include <complex>
 #include <cstdio>
@@ -26,7 +26,7 @@ struct Matrices {
   Sparse damping;
 };
 
-// Of the part that the most masses are in, at a stiffness factor.
+// Matrices of the part with the most masses, at a stiffness factor.
 Matrices matrices_of(const Machine& machine, const Program& program, double factor) {
   const auto n = static_cast<Eigen::Index>(program.moving);
   const auto value = [&](std::uint32_t c) {
@@ -65,7 +65,7 @@ Matrices matrices_of(const Machine& machine, const Program& program, double fact
   return springs;
 }
 
-// The pole near to z.
+// Returns the pole nearest to z.
 Complex nearest_pole(const Matrices& springs, Complex z) {
   Eigen::VectorXcd x = Eigen::VectorXcd::Random(springs.mass.rows());
   Eigen::SparseLU<Sparse> solver;
@@ -75,14 +75,14 @@ Complex nearest_pole(const Matrices& springs, Complex z) {
     const Sparse slope = 2.0 * (z - 1.0) * springs.mass + springs.stiffness + springs.damping;
     solver.compute(at);
     if (solver.info() != Eigen::Success) {
-      return z;  // singular: this is it
+      return z;  // Singular: z is the pole.
     }
     const Eigen::VectorXcd next = solver.solve(slope * x);
     Eigen::Index largest = 0;
     x.cwiseAbs().maxCoeff(&largest);
     const Complex change = x(largest) / next(largest);
     x = next / next.norm();
-    // The first vector knows nothing of where to go.
+    // The first vector gives no useful correction.
     if (i > 1) {
       z -= change;
       if (std::abs(change) < 1e-15) {
@@ -101,7 +101,7 @@ void check_preset(const std::string& name, double rate_hz, int step) {
   auto scene = load_scene(name, {});
   REQUIRE(scene);
   const double ratio = Network::reference_rate_hz / rate_hz;
-  // By the published scheme, for exact modes have poles of their own.
+  // Uses the published scheme, because exact modes have other poles.
   const auto compiled = compile_network(scene->network, scene->preset,
                                         {.rate_hz = rate_hz, .method = Method::direct});
   REQUIRE(compiled);
@@ -117,7 +117,7 @@ void check_preset(const std::string& name, double rate_hz, int step) {
   for (int key = 24; key <= 108; key += step) {
     const double hz = hz_of(key, scene->preset.transpose);
     if (hz > compiled->instrument.highest_frequency_hz) {
-      break;  // it is silent
+      break;  // The key is silent.
     }
     const double factor = pitches.factor_at(hz);
     const Matrices springs = matrices_of(machine, machine.parts[0], factor);
@@ -127,7 +127,7 @@ void check_preset(const std::string& name, double rate_hz, int step) {
     const double cents = 1200.0 * std::log2(std::arg(pole) / theta);
     INFO(name << " at " << rate_hz << " Hz, key " << key << ": " << cents << " cents");
     CHECK(std::fabs(cents) < 0.05);
-    // No higher mode has taken its place: such would need a stiffness of a quarter.
+    // Excludes a higher mode, which would need a quarter of the stiffness.
     CHECK(factor * shapes->mode.stiffness * ratio * ratio > 0.9 * (2.0 - 2.0 * std::cos(theta)));
     worst = std::max(worst, std::fabs(cents));
   }
@@ -145,7 +145,7 @@ TEST_CASE("keys sound at the frequency of the damped pole", "[tuning]") {
   }
 }
 
-// The poles of a sum of `order` exponentials: y[n] is a sum of the ones before.
+// The poles of a sum of `order` exponentials: y[n] is a linear combination of earlier samples.
 std::vector<Complex> poles_of_sound(const std::vector<double>& y, std::size_t first,
                                     std::size_t order, std::size_t apart) {
   const auto rows = static_cast<Eigen::Index>((y.size() - first) / apart - order);
@@ -177,7 +177,7 @@ TEST_CASE("a key is in tune in the sound of the engine", "[tuning]") {
                                                                        {69, {}},
                                                                        {45, {.cents = 1.0}},
                                                                        {69, {.cents = 1.0}}}) {
-    // A partial should turn by about a radian from one sample that is looked at to the next.
+    // The samples used are spaced so that a partial advances by about a radian.
     const double hz = hz_of(key, 0);
     const auto apart =
         static_cast<std::size_t>(std::max(1.0, 44100.0 / (2.0 * std::numbers::pi * hz) / 4.0));

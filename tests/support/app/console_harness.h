@@ -1,4 +1,4 @@
-// A console and all that it works on, driven by hand.
+// A console with process and session, driven by a test.
 #pragma once
 
 #include <unistd.h>
@@ -22,26 +22,26 @@ namespace fs = std::filesystem;
 
 inline constexpr std::size_t period = 256;
 
-// A console and all that it works on; the test is the audio thread.
+// A console with process and session; the test is the audio thread.
 struct Harness {
   explicit Harness(std::size_t channels = 2) : buffers(channels, std::vector<float>(period)) {}
 
   Process process{48000.0};
   Session session{process, {.compile = {.rate_hz = 48000.0}}, {}};
   std::string said;
-  std::promise<std::string> news;  // the first
+  std::promise<std::string> news;  // The first message.
   Console console{process, session, [this](const std::string& text) { said += text + "\n"; },
                   [this](const std::string& text) { news.set_value(text); }};
   std::vector<std::vector<float>> buffers;
 
-  // What the console says to a line.
+  // Returns the console's output for a line.
   std::string say(const std::string& line) {
     said.clear();
     console.run_line(line);
     return said;
   }
 
-  // Plays one period at most; gives the first channel.
+  // Plays at most one period; returns the first channel.
   std::vector<float> play(std::size_t frames = period) {
     std::vector<float*> outputs;
     for (auto& buffer : buffers) {

@@ -1,4 +1,4 @@
-// tests: folders that are there for as long as these live.
+// tests: temporary folders.
 #pragma once
 
 #include <unistd.h>
@@ -16,7 +16,7 @@
 
 namespace ressort {
 
-// A folder of a test's own, gone with it.
+// A folder that is removed with the object.
 class Folder {
  public:
   Folder() {
@@ -53,7 +53,7 @@ class Folder {
   std::filesystem::path path_;
 };
 
-// A data folder of the program's, instead of its own.
+// Replaces the program's data folder.
 class DataFolder {
  public:
   DataFolder() {

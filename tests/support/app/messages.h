@@ -1,4 +1,4 @@
-// tests: what a text is told, word for word.
+// tests: exact diagnostics of a text.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@
 
 namespace ressort::messages {
 
-// Exactly these, in this order; their lengths are not looked at.
+// Checks for exactly these diagnostics in this order; their lengths are ignored.
 inline void check_told(const std::string& text, const std::vector<Diagnostic>& expected) {
   const std::vector<Diagnostic> found = parse_network(text).diagnostics;
   std::string all;

@@ -1,4 +1,4 @@
-// tests: OSC packets, made and read without liblo.
+// tests: OSC packets made and read without liblo.
 #pragma once
 
 #include <bit>
@@ -96,7 +96,7 @@ inline Answer read_answer(const Bytes& bytes) {
   return answer;
 }
 
-// The bytes of a literal, zeros among them.
+// Returns the bytes of a literal, including zeros.
 inline Bytes raw(std::string_view text) {
   return Bytes(text.begin(), text.end());
 }

@@ -33,7 +33,7 @@ class Client {
     REQUIRE(::send(socket_, bytes.data(), bytes.size(), 0) == static_cast<ssize_t>(bytes.size()));
   }
 
-  // The next answer; nothing after a wait that is far longer than any answer takes.
+  // Returns the next reply; empty after a wait far longer than any reply takes.
   std::optional<Answer> receive(int most_ms = 20000) {
     pollfd wait{socket_, POLLIN, 0};
     if (poll(&wait, 1, most_ms) != 1) {
@@ -46,7 +46,7 @@ class Client {
     }
     bytes.resize(static_cast<std::size_t>(size));
     bytes_received += bytes.size();
-    REQUIRE(check_packet(bytes));  // we speak as strictly as we listen
+    REQUIRE(check_packet(bytes));  // Sent packets must pass the strict check, too.
     return read_answer(bytes);
   }
 
@@ -57,10 +57,10 @@ class Client {
     return *answer;
   }
 
-  // Waits until the server has done everything that was sent; gives back what it said before.
+  // Waits until the server has processed everything sent; returns the earlier replies.
   std::vector<Answer> sync() {
     std::vector<Answer> before;
-    for (int tries = 0; tries < 40; ++tries) {  // what is sent into a full buffer is lost
+    for (int tries = 0; tries < 40; ++tries) {  // Packets sent into a full buffer are lost.
       send(message("/status"));
       while (auto answer = receive(500)) {
         if (answer->address == "/status.reply") {

@@ -1,4 +1,4 @@
-// tests: the audio thread's whole, driven by hand and listened to.
+// tests: the complete audio thread, driven by a test.
 #pragma once
 
 #include "app/realtime/process.h"
@@ -10,18 +10,18 @@ inline constexpr double rate = 44100.0;
 inline constexpr std::size_t fade_frames = 2205;  // 50 ms
 
 inline Sounding* sounding(const std::string& text, const Preset& preset, std::uint32_t serial) {
-  // In the direct form, which rounds alike however the time is cut into blocks.
+  // The direct form rounds alike for any division into blocks.
   auto compiled = compile_network(network_of(text), preset, {.method = Method::direct});
   REQUIRE(compiled);
   return new Sounding{std::move(compiled->engine), serial};
 }
 
-// A model that stands still at a height.
+// A model with a constant output.
 inline Sounding* constant(const std::string& height, std::uint32_t serial = 1) {
   return sounding("@g ground " + height + "\n@out1 posOutput @g\n", Preset{}, serial);
 }
 
-// Output 1 is the hand, which a note holds at 1 and a release takes back to 0.
+// Output 1 is the position input, which a note holds at 1 and a release returns to 0.
 inline const std::string hand_text =
     "@in1 posInput 0.\n@m mass 1. 0. 0.\n@g ground 0.\n@k param 0.01\n"
     "@l springDamper @in1 @m k 0.01\n@r springDamper @m @g 0.01 0.01\n@out1 posOutput @in1\n";
@@ -33,14 +33,14 @@ inline Preset holding() {
   return preset;
 }
 
-// A free mass that an impulse of 1 sends off with 1 a sample: its position is the time since.
+// A free mass that a unit impulse moves by 1 per sample: its position is the elapsed time.
 inline const std::string clock_text = "@m mass 1. 0. 0.\n@in1 frcInput @m\n@out1 posOutput @m\n";
 
 inline Event push(double force = 1.0) {
   return {.kind = EventKind::gesture, .gesture = Gesture::force, .index = 1, .value = force};
 }
 
-// A process and all that it has played.
+// A process and its recorded output.
 struct Harness {
   explicit Harness(bool limit = false, std::size_t channels = 1)
       : process(rate, limit), out(channels) {}
@@ -63,7 +63,7 @@ struct Harness {
   }
   const std::vector<double>& y() const { return out[0]; }
 
-  // As OSC hands events over, with a time tag and without.
+  // Sends events as OSC does, with a time tag and without.
   bool at(std::int64_t frame, const Event& event, std::size_t times = 1) {
     return process.send_ahead(std::vector<TimedEvent>(
         times, {.event = event, .timing = TimedEvent::When::at_frame, .when = frame}));

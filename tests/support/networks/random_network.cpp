@@ -71,7 +71,7 @@ class NetworkWriter {
       case 3:
         return "osc 1.5 l [0.5 * z] " + start;
       case 4:
-        return "mass m " + number(0.0, 0.2) + " " + start;  // with gravity
+        return "mass m " + number(0.0, 0.2) + " " + start;  // With gravity.
       default:
         return "mass m " + start;
     }
@@ -108,7 +108,7 @@ class NetworkWriter {
       const std::size_t count = 8 + random_.below(60);
       Pairs springs = row(count, 1);
       if (is_open && chance(2)) {
-        springs.emplace_back(0, count - 1);  // a ring
+        springs.emplace_back(0, count - 1);  // A ring.
       }
       add_net(count, springs, family == "stiff" ? row(count, 2) : Pairs{}, {0, count - 1}, is_open);
     } else if (family == "square") {
@@ -147,7 +147,7 @@ class NetworkWriter {
 
   void add_triangle(std::size_t side, bool is_open) {
     Pairs springs;
-    std::size_t first = 0;  // of its row
+    std::size_t first = 0;  // First node of its row.
     for (std::size_t length = side; length > 1; --length) {
       for (std::size_t i = first; i + 1 < first + length; ++i) {
         springs.insert(springs.end(), {{i, i + 1}, {i, i + length}, {i + 1, i + length}});
@@ -157,7 +157,7 @@ class NetworkWriter {
     add_net(first + 1, springs, {}, {0}, is_open);
   }
 
-  // A tree and, for a graph or a small body, some springs more.
+  // A tree and, for a graph or a small body, some additional springs.
   void add_irregular(std::size_t count, bool is_graph, bool is_open) {
     Pairs springs;
     for (std::size_t i = 1; i < count; ++i) {
@@ -169,8 +169,8 @@ class NetworkWriter {
     add_net(count, springs, {}, {}, is_open, !is_alike_ && chance(2));
   }
 
-  // Masses, springs between them and, of another kind, second ones. The masses of `corners` are
-  // grounds or hang on one or on a hand, but where it is open.
+  // Masses, springs between them and, of another kind, second springs. The masses of `corners` are
+  // grounds or attached to one or to a position input, unless the network is open.
   void add_net(std::size_t count, const Pairs& springs, const Pairs& seconds,
                const std::vector<std::size_t>& corners, bool is_open, bool is_mixed = false) {
     const std::string kind = mass();
@@ -224,7 +224,7 @@ class NetworkWriter {
     anchor(ends_.back());
   }
 
-  // A body of modes, tied to what is there; from numbers of its own.
+  // A body of modes, tied to the existing network, from a separate random sequence.
   void add_modal_body() {
     Random random(seed_ ^ 0x5deece66du);
     const auto any = [&](double low, double high) { return show(random.uniform(low, high)); };
@@ -252,7 +252,7 @@ class NetworkWriter {
     }
   }
 
-  // --- what acts on them and listens ---
+  // --- inputs and outputs ---
 
   std::string hand() {
     if (driven_ == 3 || chance(2)) {
@@ -284,7 +284,7 @@ class NetworkWriter {
     }
   }
 
-  // A nonlinear link of some mass to `end`.
+  // A nonlinear link from some mass to `end`.
   void add_bent(const std::string& end) {
     const std::string mass = some();
     if (mass == end) {
@@ -295,17 +295,17 @@ class NetworkWriter {
         {"nlSpring2", "0.01 0.02 0.001"},
         {"nlSpring3", "0.01 0.05 0.002"},
         {"nlSpring3", "l 0.2*l z"},
-        {"nlSpringDamper", "0.005 0.001 0.02 0.002"},  // far from where it is clipped
+        {"nlSpringDamper", "0.005 0.001 0.02 0.002"},  // Far from its clipping point.
         {"contact", "0.01 0. 0.002"},
         {"contact", "l 0. 0."},
-        {"contact", "0.001 0.003 1."},  // never lets go
+        {"contact", "0.001 0.003 1."},  // Always in contact.
         {"nlContact", "0.005 0.1 0.02 0. 0.003"},
         {"nlContact", "0.001 0.00001 0.002 0.003 1."},
         {"nlPluck", "0.01 0.02"},
         {"nlPluck", "0.5*l 0.1"},
-        {"nlPluck", "0.001 1. 0.002"},  // never lets go
+        {"nlPluck", "0.001 1. 0.002"},  // Never releases.
         {"nlBow", "0.004 0.002"},
-        {"nlBow", "z 9."},  // never slips
+        {"nlBow", "z 9."},  // Never slips.
         {"nlBow", "0.004 0.002 1"},
         {"nlSpring2", "0.5*l l z"}};
     const auto& law = laws[random_.below(std::size(laws))];
@@ -343,12 +343,12 @@ class NetworkWriter {
   std::uint64_t seed_;
   Random random_;
   std::vector<std::string> lines_;
-  std::vector<std::string> ends_;        // what links may hold
-  std::vector<std::string> hand_names_;  // position inputs
+  std::vector<std::string> ends_;        // Ends that links may use.
+  std::vector<std::string> hand_names_;  // Position inputs.
   std::size_t labels_ = 0;
   std::size_t driven_ = 0;
   bool is_linear_ = true;
-  bool is_alike_ = true;  // masses and springs, so that they share their eigenvectors
+  bool is_alike_ = true;  // Equal masses and springs, so that they share eigenvectors.
   std::string alike_mass_;
   bool has_audio_ = false;
   bool may_drift_ = false;

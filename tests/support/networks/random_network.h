@@ -1,14 +1,16 @@
-// tests: networks that nobody wrote, from a seed, as texts. Each is one that two builds of the same
-// kernel agree on: nothing in it is chaotic, so that what differs is a kernel's own doing.
+// tests: random networks from a seed, as texts. None is chaotic, so that two builds of a kernel
+// agree, and any difference is due to the kernel.
 //
-// * No spring is stiff enough to be unstable at any pitch and turn of the tests.
-// * Wherever a link's force has an edge (a finger that comes and goes, the zones of a pluck) it is
-//   continuous: without damping of its own. An edge that rounding passes a sample earlier or later
-//   then moves nothing.
-// * What repels (a pluck's middle) or feeds (the falling friction of a bow) is weaker than the
-//   spring and the damper that its mass hangs on besides: small differences die out.
-// * Where links are nonlinear everything is held, so that nothing drifts to where they are steep.
-//   Nor does it where a force is heard: far from 0 that is a small difference of large numbers.
+// * No spring is stiff enough to be unstable at any pitch and parameter value of the tests.
+// * A link whose force has an edge (a finger that comes and goes, the zones of a pluck) is
+// continuous
+//  there: it has no damping of its own. An edge passed a sample earlier or later by rounding then
+//  has no effect.
+// * Repelling forces (the middle of a pluck) and energy sources (the falling friction of a bow) are
+//  weaker than the spring and damper of their mass, so that small differences decay.
+// * In a network with nonlinear links everything is held, so that nothing drifts to where they are
+//  steep. The same holds for force outputs, which are small differences of large numbers far from
+//  0.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +22,7 @@ struct RandomNetwork {
   std::string family;
   std::string text;
   bool is_linear = true;
-  bool may_drift = false;  // nothing holds some of it
+  bool may_drift = false;  // Part of it is not held.
 };
 
 RandomNetwork random_network(std::uint64_t seed);

@@ -1,9 +1,9 @@
-// tests: a slow textbook simulator, one object per element: the oracle for every kernel. Written
-// from the published formulas and never from the engine. reference_network.h builds one from a
-// Network.
+// tests: a slow reference simulator with one object per element, against which every kernel is
+// tested. It is written from the published formulas, independently of the engine.
+// reference_network.h builds one from a Network.
 //
-// Positions are kept as x[n] and x[n-1], as published. That form loses u/theta of a slow mode's
-// precision, so it is carried out in the widest arithmetic that the machine has.
+// Positions are stored as x[n] and x[n-1], as published. That form loses a factor u/theta of
+// precision for slow modes, so it uses the widest floating-point type.
 #pragma once
 
 #include <algorithm>
@@ -16,13 +16,13 @@
 namespace ressort::reference {
 
 using Real = long double;
-using Number = const Real*;  // lives in the simulator, so that a parameter may change it
+using Number = const Real*;  // Lives in the simulator, so that a parameter can change it.
 
 inline Real sgn(Real x) {
   return x > 0 ? 1 : x < 0 ? -1 : 0;
 }
 
-// --- what has a position ----------------------------------------------------------------------
+// --- elements with a position ------------------------------------------------------------------
 
 class Point {
  public:
@@ -33,7 +33,7 @@ class Point {
 
   virtual void step() = 0;
   void receive(Real force) { force_ += force; }
-  // A force input's value, which is felt for the whole tick although it moves the mass at once.
+  // A force input's value acts during the whole tick, although it moves the mass immediately.
   virtual void push(Real force) {
     receive(force);
     pushed_ += force;
@@ -41,7 +41,7 @@ class Point {
   void begin_tick() { pushed_ = 0; }
   Real position() const { return x_; }
   Real velocity() const { return x_ - x_before_; }
-  // What the links have exerted since the last step, and the inputs in this tick.
+  // Returns the forces of links since the last step and of inputs in this tick.
   virtual Real felt() const { return force_ + pushed_; }
 
  protected:
@@ -115,11 +115,11 @@ class PositionInput : public Point {
   Real in_;
 };
 
-// A place on rows * columns nodes, with no mass of its own. Along each side node i counts with
-// w_i = max(0, 1 - |p - i|), p being the coordinate in nodes: X = sum w_i x_i, F_i += w_i F.
+// A massless place on rows * columns nodes. Along each side node i has the weight w_i = max(0, 1 -
+// |p - i|), with p the coordinate in nodes: X = sum w_i x_i, F_i += w_i F.
 class MacroPoint : public Point {
  public:
-  // Of a body, `rows` places, at each of which every mode has a displacement, [place][mode].
+  // For a body: `rows` places, with a displacement per mode at each, [place][mode].
   MacroPoint(std::vector<Point*> nodes, std::size_t rows, std::size_t columns, Number u, Number v,
              std::vector<Real> shapes = {})
       : Point(0, 0),
@@ -180,7 +180,7 @@ class MacroPoint : public Point {
   std::vector<Real> shapes_;
 };
 
-// --- what exerts a force: F_a -= f, F_b += f --------------------------------------------------
+// --- elements that exert a force: F_a -= f, F_b += f --------------------------------------------
 
 class Interaction {
  public:
@@ -213,7 +213,7 @@ class SpringDamper : public Interaction {
   Number z_;
 };
 
-// f = K d + Q sgn(d) d^2 + Z v, or with d^3
+// f = K d + Q sgn(d) d^2 + Z v, or with d^3.
 class NonlinearSpring : public Interaction {
  public:
   NonlinearSpring(Point& a, Point& b, Number k, Number q, Number z, bool cubic)
@@ -353,7 +353,7 @@ class SmoothBow : public Interaction {
   Number s_;
 };
 
-// One of the two, as the profile says at every tick.
+// One of two profiles, selected in every tick.
 class EitherBow : public Interaction {
  public:
   EitherBow(Point& a, Point& b, Number z, Number s, Number profile)
@@ -386,11 +386,11 @@ class Contact : public Interaction {
   Number threshold_;
 };
 
-// --- all of them together ---------------------------------------------------------------------
+// --- the simulator -------------------------------------------------------------------------------
 
 class Simulator {
  public:
-  // A number that the elements may use, and that may be set later.
+  // Adds a number for the elements, which may be changed later.
   Real& number(Real value) { return numbers_.emplace_back(value); }
 
   Point& add_mass(Number m, Real x0, Real x1) { return add_point<MassPoint>(m, x0, x1); }
@@ -440,24 +440,24 @@ class Simulator {
     add<PowerContact>(a, b, k, p, z, threshold);
   }
 
-  // A force of -g / divisor at every tick.
+  // Adds a force of -g / divisor in every tick.
   void add_gravity(Point& point, Number g, Real divisor) {
     weights_.push_back({&point, g, divisor});
   }
 
-  // Inputs are numbered as they are added, forces and positions together; so are outputs.
+  // Inputs are numbered in order of addition, forces and positions together; so are outputs.
   void add_force_input(Point& point) { inputs_.push_back({&point, nullptr}); }
   void add_position_input(PositionInput& point) { inputs_.push_back({nullptr, &point}); }
-  void add_output(const Point* point, bool is_force = false) {  // null: always 0
+  void add_output(const Point* point, bool is_force = false) {  // Null: always 0.
     outputs_.push_back({point, is_force});
   }
 
   std::size_t input_count() const { return inputs_.size(); }
   std::size_t output_count() const { return outputs_.size(); }
 
-  // One tick, in the paper's timing: a force input acts on the position of the same tick, a place
-  // on a macro is where its coordinates are in this tick; then masses, position inputs, places,
-  // links; an output reads what is new.
+  // One tick with the paper's timing: a force input acts on the position of the same tick, and a
+  // place on a macro uses its coordinates of this tick. Then masses, position inputs, places and
+  // links step; an output reads the new state.
   std::vector<double> step(std::span<const double> inputs) {
     for (const auto& point : points_) {
       point->begin_tick();
@@ -526,7 +526,7 @@ class Simulator {
 
   std::deque<Real> numbers_;
   std::vector<std::unique_ptr<Point>> points_;
-  std::vector<Point*> points_in_order_;  // masses, oscillators, grounds
+  std::vector<Point*> points_in_order_;  // Masses, oscillators, grounds.
   std::vector<PositionInput*> position_points_;
   std::vector<MacroPoint*> macro_points_;
   std::vector<std::unique_ptr<Interaction>> links_;

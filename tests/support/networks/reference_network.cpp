@@ -51,13 +51,13 @@ class Builder {
   struct Grid {
     std::size_t rows = 1;
     std::size_t columns = 1;
-    std::vector<Point*> nodes;  // row by row
-    std::vector<Real> shapes;   // of a body, [place][mode]
+    std::vector<Point*> nodes;  // Row by row.
+    std::vector<Real> shapes;   // Of a body, [place][mode].
   };
 
   Number number(ArgumentId id) const { return id == no_argument ? zero_ : made_.arguments[id]; }
 
-  // X[-1] of what starts at x0.
+  // X[-1] of a node that starts at x0.
   Real delayed(double x0, double third) const {
     return network_.third == ThirdArgument::delayed_position ? Real{third}
                                                              : Real{x0} - Real{third} / 44100;
@@ -70,7 +70,7 @@ class Builder {
       case MacroKind::chain:
       case MacroKind::mesh:
       case MacroKind::body:
-      case MacroKind::waveguide:  // the textbook's simulator has none
+      case MacroKind::waveguide:  // The reference simulator has no waveguides.
       case MacroKind::open_waveguide:
         return false;
       case MacroKind::string:
@@ -127,8 +127,8 @@ class Builder {
       }
     }
     if (macro.kind == MacroKind::stiff_string) {
-      // Every second node, counted from one before the first to one after the last: both ends hold
-      // the assembly's index, so that there the K2 goes to the neighbour.
+      // Every second node, from one before the first to one after the last. Both ends repeat the
+      // index, so that K2 there acts on the neighbour.
       const auto last = static_cast<std::ptrdiff_t>(grid.rows) - 1;
       for (std::ptrdiff_t middle = 0; middle <= last; ++middle) {
         const auto below = static_cast<std::size_t>(std::max<std::ptrdiff_t>(middle - 1, 0));
@@ -159,7 +159,7 @@ class Builder {
         hand = &simulator_.add_position_point(x0);
         points_.push_back(hand);
         break;
-      case MassKind::junction:  // of expanded networks alone
+      case MassKind::junction:  // Only in expanded networks.
         break;
       case MassKind::point: {
         const Tap& tap = network_.taps[mass.tap];
@@ -214,7 +214,7 @@ class Builder {
   Number zero_ = nullptr;
   std::vector<Grid> grids_;             // [macro]
   std::vector<Point*> points_;          // [mass]
-  std::vector<PositionInput*> driven_;  // [mass] null where it is none
+  std::vector<PositionInput*> driven_;  // [mass] Null if it is not driven.
 };
 
 }  // namespace

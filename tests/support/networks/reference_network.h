@@ -1,5 +1,5 @@
-// tests: the textbook simulator of a Network. Macros are written out here too, from their published
-// description and never from the model room's.
+// tests: the reference simulator of a Network. Macros are expanded here from their published
+// description, independently of the model room.
 #pragma once
 
 #include <span>
@@ -11,7 +11,7 @@
 
 namespace ressort::reference {
 
-// A Network's simulator and the numbers that its parameters move.
+// A Network's simulator and the numbers that its parameters change.
 struct Simulation {
   Simulator simulator;
   std::vector<Real*> arguments;  // [ArgumentId]

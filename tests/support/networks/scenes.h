@@ -1,5 +1,5 @@
-// tests: the scenes that tests share, as .mdl texts. The nine instruments of Leonard, Villeneuve
-// and Michon are built here in full size from their description: labels, numbers, inputs, outputs.
+// tests: shared scenes as .mdl texts. The nine instruments of Leonard, Villeneuve and Michon are
+// built in full size from their description: labels, numbers, inputs, outputs.
 #pragma once
 
 #include <string>
@@ -55,9 +55,9 @@ struct Example {
   std::string name;
   std::string text;
   bool is_linear = true;
-  int moving = 0;  // what the description counts
+  int moving = 0;  // Moving masses according to the description.
   int links = 0;
-  double reach = 1.0;  // of its first input's motion: a position, a speed for bows, or a force
+  double reach = 1.0;  // Amplitude of its first input: a position, a speed for bows, or a force.
 };
 
 std::vector<Example> nine_instruments();

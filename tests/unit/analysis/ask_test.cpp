@@ -1,5 +1,5 @@
-// Timbre that is asked for: hidden parameters are found again, as the textbook simulator renders
-// them; and what cannot be had says so.
+// Target timbres: hidden parameters are found from renders of the reference simulator, and
+// unreachable targets are reported.
 #include <cmath>
 #include <cstdio>
 #include <ctime>
@@ -19,14 +19,14 @@ namespace {
 
 constexpr double rate_hz = 44100.0;
 constexpr std::size_t frame = 2048;
-constexpr std::size_t sound_samples = 22050;  // of which attacks are told
+constexpr std::size_t sound_samples = 22050;  // Length for the attack.
 
 struct Ranged {
   double minimum;
   double maximum;
 };
 
-// A linear model, and where its parameters may be.
+// A linear model and the ranges of its parameters.
 struct Played {
   const char* text;
   std::vector<Ranged> ranges;
@@ -67,7 +67,7 @@ double drawn(support::Random& random, const Ranged& range) {
              : random.uniform(range.minimum, range.maximum);
 }
 
-// What comes after a blow, as the textbook simulator has it.
+// The response to a strike in the reference simulator.
 std::vector<double> rendered(const Network& network, std::span<const double> parameters,
                              std::size_t count) {
   auto simulation = reference::make_simulation(network, parameters);
@@ -88,7 +88,8 @@ std::optional<double> attack_ms(std::span<const double> samples) {
   return shape ? std::optional(1e3 * std::pow(10.0, shape->log_attack_time)) : std::nullopt;
 }
 
-// What that is like; f0 and T60 are not to be read off its first 46 ms, so they are the modes' own.
+// The descriptors of that sound. Its first 46 ms do not determine f0 and T60, so those are taken
+// from the modes.
 AskedValues heard(const Played& model, std::span<const double> parameters) {
   const Network network = read(model);
   const auto told = StruckModel(network, {}).figures(parameters, StruckAs::lines);
@@ -188,8 +189,8 @@ TEST_CASE("the timbre of hidden parameters is always found", "[ask]") {
   CHECK(found == seeds);
 }
 
-// Two masses alike, struck at one and heard at the other: the blow comes over in half a beat of
-// their two modes, of which the spring between them is the difference.
+// Two equal masses, struck at one and heard at the other: the energy crosses in half a beat of
+// their two modes, which the spring between them separates.
 const Played beating{
     "@k param 0.002\n@c param 0.00002\n@z param 0.0005\n@g ground 0.\n@a mass 1. 0. 0.\n"
     "@b mass 1. 0. 0.\n@l0 springDamper @g @a k z\n@l1 springDamper @g @b k z\n"
@@ -215,7 +216,7 @@ TEST_CASE("a requested attack is reached in the sound", "[ask]") {
     INFO(wanted_ms << " ms, " << reached_ms << " ms");
     CHECK(std::fabs(noticed_between(AskedFigure::attack, reached_ms, wanted_ms)) < 0.1);
   }
-  // The slowest is where the spring between them is the weakest, and what they lose the least.
+  // The slowest attack has the weakest spring between them and the least loss.
   const TimbreTarget slow[] = {{AskedFigure::attack, 10000.0}};
   const auto slowest = asked(beating, std::vector<double>{0.002, 0.00002, 0.0005}, slow);
   REQUIRE(slowest);
@@ -238,14 +239,14 @@ TEST_CASE("unreachable targets are reported with the bound that limits them", "[
   CHECK_FALSE(top->is_reached);
   CHECK(top->values[0] == 0.9);
   CHECK(*top->reached[static_cast<std::size_t>(AskedFigure::f0)] ==
-        Approx(highest_hz).epsilon(1e-4));  // Z shifts it a little
+        Approx(highest_hz).epsilon(1e-4));  // Z shifts it a little.
   REQUIRE_FALSE(top->held.empty());
   CHECK(top->held[0].index == 0);
   CHECK(top->held[0].is_highest);
   CHECK(top->noticed[0] < -100.0);
 
-  // T60 = 13.8155 / (rate zeta), zeta = Z/M (2 sin(pi / 2 / (N + 1)))^2: the longest with Z at its
-  // lowest, whatever K is.
+  // T60 = 13.8155 / (rate zeta), zeta = Z/M (2 sin(pi / 2 / (N + 1)))^2: the longest has Z at its
+  // lowest, for any K.
   const double zeta = 1e-4 * std::pow(2.0 * std::sin(std::numbers::pi / 78.0), 2.0);
   const TimbreTarget long_one[] = {{AskedFigure::t60, 1e300}};
   const auto longest = asked(model, start, long_one);
@@ -290,7 +291,7 @@ TEST_CASE("invalid figures and models without free parameters are rejected", "[a
         "no parameter is free to change");
   const FreeParameter one[] = {{0, 0.1, 0.3}};
   CHECK(ask_timbre({any}, start, one, {}, {}).error().message == "nothing is asked for");
-  // What has no influence is where it was, and says so.
+  // A parameter without influence keeps its value, and the result says so.
   const auto idle = ask_timbre({any}, start, one, bright, {});
   REQUIRE(idle);
   CHECK_FALSE(idle->has_influence);
@@ -300,7 +301,7 @@ TEST_CASE("invalid figures and models without free parameters are rejected", "[a
 }
 
 TEST_CASE("a search handles silence, unstable corners and cancellation", "[ask]") {
-  // Heard at a mass that no spring reaches.
+  // The output is at a mass without a spring.
   const Played silent{
       "@k param 0.1\n@g ground 0.\n@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n"
       "@s spring @g @a k\n@in1 frcInput @a\n@out1 posOutput @b\n",
@@ -310,7 +311,7 @@ TEST_CASE("a search handles silence, unstable corners and cancellation", "[ask]"
   REQUIRE_FALSE(nothing);
   CHECK(nothing.error().message.find("the output is silent") != std::string::npos);
 
-  // Above K = 4 M nothing is stable: the search goes around it.
+  // Above K = 4 M the model is unstable: the search avoids that.
   const Played corner{
       "@k param 0.1\n@z param 0.001\n@g ground 0.\n@a mass 1. 0. 0.\n"
       "@s springDamper @g @a k z\n@in1 frcInput @a\n@out1 posOutput @a\n",
@@ -357,7 +358,7 @@ TEST_CASE("a key scales springs at places of a string", "[ask]") {
   CHECK(*(*told)[static_cast<std::size_t>(AskedFigure::f0)] == Approx(220.0).epsilon(1e-8));
 }
 
-// A raised cosine of 2 ms is a filter; and what is heard of two ears is their mean.
+// A raised cosine of 2 ms is a low-pass filter; the output is the mean of two channels.
 TEST_CASE("a longer strike is darker, like the sound of the same pulse", "[ask]") {
   const Network network = support::network_of(
       "@k param 0.2\n@s string 40 1. k 0.001 0. 0.\n@in1 frcInput [@s 0.23]\n"

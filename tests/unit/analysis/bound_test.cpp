@@ -1,4 +1,4 @@
-// Stability: the bound by hand on small networks, and against simulation on random ones.
+// The edge bound: hand-computed on small networks, and against simulation on random ones.
 #include "tests/support/growth.h"
 #include "tests/support/random.h"
 
@@ -7,7 +7,7 @@ namespace {
 
 using namespace support;
 
-// The largest eigenvalue of M^-1 K, by power iteration through the network's springs.
+// The largest eigenvalue of M^-1 K, by power iteration over the network's springs.
 double stiffest(const Network& network) {
   const auto values = parameter_values(network);
   std::vector<double> x(network.masses.size());
@@ -45,7 +45,7 @@ TEST_CASE("the edge bound equals hand-computed values", "[bound]") {
   CHECK(factor_of(scenes::bowed_string()) < factor_of(scenes::string("s", 150, "0.3", "0.001")));
   // An oscillator: K/M and 2 Z/M.
   CHECK(factor_of("@o osc 2. 0.5 0.1 0. 0.") == Approx((bound_limit - .1) / .25).epsilon(1e-14));
-  // At half the step K counts a quarter, Z a half.
+  // With half the step K counts a quarter, Z a half.
   CHECK(factor_of("@o osc 2. 0.5 0.1 0. 0.", 0.5) ==
         Approx((bound_limit - .05) / .0625).epsilon(1e-14));
 }
@@ -62,7 +62,7 @@ TEST_CASE("every law counts with its steepest slope", "[bound]") {
         Approx((bound_limit - .1) / .05).epsilon(1e-14));
   CHECK(factor_of(mass_and_ground + "@l nlBow @m @g 1 1") ==
         Approx(bound_limit / (2.0 / 3.0)).epsilon(1e-14));
-  // Which profile it will have nobody knows.
+  // The profile may be a parameter.
   for (const char* const profile : {"1", "p"}) {
     CHECK(factor_of("@p param 0\n" + mass_and_ground + "@l nlBow @m @g 1 1 " + profile) ==
           Approx(bound_limit / 1.0387).epsilon(1e-14));
@@ -75,7 +75,7 @@ TEST_CASE("the edge bound handles unlimited networks and excessive dampers", "[b
   CHECK(factor_of(mass_and_ground + "@d damper @m @g 3.9") == 1e9);
   CHECK(factor_of(mass_and_ground + "@d damper @m @g 4") <= 0.0);
   CHECK(factor_of("@o osc 1. 0.5 2. 0. 0.") <= 0.0);
-  // And they are: x is multiplied by 1 - Z/M < -1 a step.
+  // They are too strong: x is multiplied by 1 - Z/M < -1 in each step.
   CHECK(growth(network_of(mass_and_ground + "@d damper @m @g 4.1\n@out1 posOutput @m"), 1.0) >
         1e10);
   CHECK(growth(network_of(mass_and_ground + "@d damper @m @g 3.9\n@out1 posOutput @m"), 1.0) < 10);
@@ -93,7 +93,7 @@ TEST_CASE("on random networks the bound is safe, and within a factor of two of t
   support::Random random(6);
   double loosest = 10.0;
   for (int i = 0; i < 100; ++i) {
-    // Masses hang on a tree with some more springs across, one of them on a ground.
+    // Masses on a tree with some additional springs, one of them to a ground.
     const int count = 2 + static_cast<int>(random.below(12));
     std::string text = "@g ground 0.\n@l spring @g @m0 0.1\n";
     int links = 0;
@@ -126,7 +126,7 @@ TEST_CASE("on random networks the bound is safe, and within a factor of two of t
     REQUIRE(growth(network, reference * 1.02) > 1e10);
     loosest = std::min(loosest, factor / reference);
   }
-  CHECK(loosest < 0.97);  // it is a bound and not the reference
+  CHECK(loosest < 0.97);  // It is a bound, not the exact limit.
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// The factorisation's inverse, against one that is written out.
+// The factorisation's inverse, against a dense inverse.
 #include "core/linear_algebra/cholesky.h"
 
 #include <cmath>
@@ -11,7 +11,7 @@
 namespace ressort::cholesky_test {
 namespace {
 
-// Gauss and Jordan, of a matrix row by row.
+// Gauss-Jordan elimination of a row-major matrix.
 std::vector<double> inverse(std::vector<double> a, std::size_t n) {
   std::vector<double> b(n * n, 0.0);
   for (std::size_t i = 0; i < n; ++i) {

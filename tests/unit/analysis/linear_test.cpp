@@ -51,14 +51,14 @@ std::string chain(int count) {
 }  // namespace
 
 TEST_CASE("a string's lowest mode is 4 sin^2(pi / 2(N+1)) of K and of Z", "[linear]") {
-  // 64 and 65 masses lie on either side of where the sparse solver begins.
+  // 64 and 65 masses lie on either side of the switch to the sparse solver.
   for (const int count : {1, 2, 10, 50, 64, 65, 150, 1000}) {
     const double share = 4.0 * sin_squared(std::numbers::pi / (2.0 * (count + 1)));
     check_mode(std::to_string(count) + " masses",
                mode_of(scenes::string("s", count, "0.1", "0.001")), 0.1 * share, 0.001 * share,
                1e-9);
   }
-  // By closed forms and an independent eigenvalue solver.
+  // Values from closed forms and an independent eigenvalue solver.
   CHECK(mode_of(scenes::string("s", 50, "0.1", "0.001"))->frequency_hz ==
         Approx(136.70267890413).epsilon(1e-9));
   CHECK(mode_of(scenes::bowed_string())->frequency_hz == Approx(79.9810014580398).epsilon(1e-9));
@@ -88,14 +88,14 @@ TEST_CASE("the triangle's lowest mode equals that of its 2x2 matrix", "[linear]"
                       (1.0 + slope * slope);
   const auto mode = mode_of(scenes::poly_triangle());
   check_mode("triangle", mode, kappa, zeta, 1e-12);
-  // The true pole, damped out of proportion, is at 858.455895 Hz.
+  // The true pole, with non-proportional damping, is at 858.455895 Hz.
   INFO(show(mode->frequency_hz));
   CHECK(std::fabs(mode->frequency_hz / 858.455895090791 - 1.0) < 1e-4);
 }
 
 TEST_CASE("rigid motions are not modes", "[linear]") {
   for (const int count : {2, 3, 60, 200}) {
-    // A free chain's are 4 sin^2(j pi / 2N), j = 0 being rigid.
+    // A free chain has 4 sin^2(j pi / 2N); j = 0 is rigid.
     const double share = 4.0 * sin_squared(std::numbers::pi / (2.0 * count)) / 2.0;
     check_mode("chain of " + std::to_string(count), mode_of(chain(count)), 0.1 * share,
                0.001 * share, 1e-8);

@@ -1,5 +1,5 @@
-// Modes from the shapes of others: those that are kept are exact, and what a little change does to
-// them is what finding all anew says, by central differences.
+// Modes computed from known shapes: exact for unchanged shapes, and consistent with central
+// differences of full solutions for small changes.
 #include <cmath>
 #include <string>
 
@@ -14,7 +14,7 @@ namespace {
 
 using Complex = std::complex<double>;
 
-// What is heard of all modes: their sum after so many samples.
+// The sum of all modes as heard after this many samples.
 Complex sum_after(const std::vector<HeardMode>& modes, double samples) {
   Complex sum;
   for (const HeardMode& mode : modes) {
@@ -69,7 +69,7 @@ TEST_CASE("unchanged shapes give the modes exactly", "[nearby_modes]") {
         CHECK((*kept)[i].tone.frequency_hz == Approx(heard[i].tone.frequency_hz).epsilon(1e-12));
         CHECK((*kept)[i].tone.t60_s == Approx(heard[i].tone.t60_s).epsilon(1e-9));
       }
-      // Of a pair any mixture is a mode, but what both sound like together is one.
+      // Modes of a pair may be mixed, but the sound of both together is unique.
       for (const double samples : {1.0, 57.0, 1000.0}) {
         CHECK(std::abs(sum_after(*kept, samples) - sum_after(heard, samples)) < 1e-10);
       }
@@ -95,26 +95,26 @@ TEST_CASE("different rows or shapes are detected", "[nearby_modes]") {
   CHECK_FALSE(known.nearly(system_of(longer, std::vector{0.1, 0.0})));
 }
 
-// What a motion's pole and residue move by with the first parameter: by first order, and by modes
-// found anew a little to either side, where the third order is left.
+// Derivatives of pole and residue by the first parameter: by perturbation, and by full solutions on
+// either side, with a third-order error.
 TEST_CASE("small changes of shape match central differences", "[nearby_modes]") {
   const std::string ends =
       "@in1 frcInput [@s 0.1818181818]\n@out1 posOutput [@s 0.6363636364]\n@out2 posOutput [@s "
       "0.8181818182]\n";
   const std::string cases[] = {
-      // A spring to the ground, of a string that air damps.
+      // A spring to the ground on a string with air loss.
       "@c param 0.05\n@s string 12 1. 0.2 0. 0.002 0. 0.\n@g ground 0.\n"
       "@foot spring @g [@s 0.3636363636] c\n" +
           ends,
-      // Its damper: to first order shapes turn complex.
+      // Its damper: the shapes become complex to first order.
       "@d param 0.\n@s string 12 1. 0.2 0. 0.002 0. 0.\n@g ground 0.\n"
       "@foot springDamper @g [@s 0.3636363636] 0.05 d\n" +
           ends,
-      // Nothing holds it: one motion does not swing.
+      // A free chain: one motion does not oscillate.
       "@c param 0.05\n@s chain 12 1. 0.2 0. 0. 0.\n@foot spring [@s 0.09090909091] [@s "
       "0.7272727273] c\n" +
           ends,
-      // The spring by which a position moves it, and a force is heard.
+      // The spring of a position input, and a force output.
       "@c param 0.05\n@s string 12 1. 0.2 0. 0.002 0. 0.\n@in1 posInput 0.\n"
       "@hand spring @in1 [@s 0.3636363636] c\n@g ground 0.\n@wall spring @g [@s 0.6363636364] "
       "c\n@out1 frcOutput @g\n",
@@ -161,7 +161,7 @@ TEST_CASE("small changes of shape match central differences", "[nearby_modes]") 
 }
 
 TEST_CASE("degenerate modes that split are computed anew", "[nearby_modes]") {
-  // A square, and a spring that is no part of its symmetry.
+  // A square, and a spring that breaks its symmetry.
   const Network network = expand_macros(
       support::network_of("@c param 0.\n@s closedMesh 8 8 1. 0.1 0.001 0. 0.\n@g ground 0.\n"
                           "@foot spring @g [@s 0.2 0.4] c\n@in1 frcInput [@s 0.3 0.6]\n@out1 "
@@ -169,7 +169,7 @@ TEST_CASE("degenerate modes that split are computed anew", "[nearby_modes]") {
   NearbyModes known = nearby(network);
   CHECK(known.nearly(system_of(network, std::vector{0.0})));
   CHECK_FALSE(known.nearly(system_of(network, std::vector{1e-6})));
-  // And so the figures near there are those that are there.
+  // Figures near that point equal those of a full solution.
   StruckModel near(network, {});
   StruckModel anew(network, {});
   const auto told = near.figures_near(std::vector{0.0}, std::vector{1e-6}, StruckAs::samples);

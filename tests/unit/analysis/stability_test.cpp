@@ -1,5 +1,5 @@
-// Stability: the proof against closed forms and against the spectra of random networks. The bound
-// by hand: bound_test.cpp.
+// Stability: the proof against closed forms and against spectra of random networks. bound_test.cpp
+// tests the edge bound.
 #include "core/analysis/stability.h"
 
 #include "core/model/language/expression.h"
@@ -15,12 +15,12 @@ namespace {
 
 using namespace support;
 
-// All of a number's digits.
+// Prints all digits.
 std::string digits(double value) {
   return print_number(value);
 }
 
-// What a test knows of a network without asking it: the masses, and the springs between them.
+// A network known to the test independently: its masses and springs.
 struct Wiring {
   struct Spring {
     int a = 0;  // -1: a ground
@@ -61,7 +61,7 @@ struct Wiring {
   Eigen::Index size() const { return static_cast<Eigen::Index>(masses.size()); }
 };
 
-// Masses on a tree that hangs on a ground, with springs across; dampers of their own strengths.
+// Masses on a tree attached to a ground, with additional springs and individual dampers.
 Wiring random_wiring(support::Random& random) {
   Wiring wiring;
   const int count = 2 + static_cast<int>(random.below(9));
@@ -126,7 +126,7 @@ double lowest(const std::string& text, const std::string& name) {
   return range.lowest;
 }
 
-// "line: message", or nothing of a stable network.
+// Returns "line: message", or an empty text for a stable network.
 std::string complaint_of(const std::string& text) {
   const Network network = network_of(text);
   const Certificate certificate = Stability(network, 1.0).certify(as_written(network));
@@ -152,7 +152,7 @@ TEST_CASE("a parameter that starts at 0 may go to both sides", "[stability]") {
   const SafeRange both = range_of(text, "w");
   CHECK(both.lowest == Approx(-0.5).epsilon(1e-9));
   CHECK(both.highest == Approx(3.3).epsilon(1e-9));
-  // A damper below 0 feeds, whatever else there is.
+  // A negative damper is unstable in any network.
   CHECK(range_of("@w param 0.\n@o osc 1. 0.5 w 0. 0.\n", "w").lowest == 0.0);
 }
 
@@ -164,7 +164,7 @@ TEST_CASE("every unstable root is a negative eigenvalue of 4M - K - 2Z, and the 
     Wiring wiring = random_wiring(random);
     const Eigen::MatrixXd load =
         wiring.sum(&Wiring::Spring::k) + 2.0 * wiring.sum(&Wiring::Spring::z);
-    // Around the limit, and well above, where several roots are outside.
+    // Near the limit, and well above it, where several roots are outside.
     const double off = i % 2 == 0 ? random.uniform(0.99, 1.01) : random.uniform(0.5, 3.0);
     const double scale = off * 4.0 / support::pencil_values(load, wiring.mass()).maxCoeff();
     for (Wiring::Spring& spring : wiring.springs) {
@@ -204,7 +204,7 @@ TEST_CASE("the exact factor on every stiffness is where the lowest eigenvalue is
     }
     const Eigen::VectorXd pencil = support::pencil_values(wiring.sum(&Wiring::Spring::k), rest);
     REQUIRE(factor == exactly(1.0 / pencil.maxCoeff()));
-    REQUIRE(factor >= factor_of(wiring.text()));  // what the bound allows is allowed
+    REQUIRE(factor >= factor_of(wiring.text()));  // The exact factor is at least the bound.
     ++found;
   }
   CHECK(found > 150);
@@ -232,7 +232,7 @@ TEST_CASE("the range of one parameter matches theory", "[stability]") {
   CHECK(highest("@K param 0.1\n@d mesh 20 30 1. K 0.01 0. 0.\n", "K") ==
         exactly(4.0 / mesh - 0.02));
   CHECK(lowest("@M param 1.\n@d mesh 20 30 M 0.1 0.01 0. 0.\n", "M") == exactly(0.12 * mesh / 4.0));
-  // A light mass on a heavy one: k = 4 (4 - .01) / (4 - .01 + 4000) and no less.
+  // A light mass on a heavy one: k = 4 (4 - .01) / (4 - .01 + 4000) exactly.
   CHECK(highest("@k param 0.001\n@g ground 0.\n@a mass 1. 0. 0.\n@b mass 0.001 0. 0.\n"
                 "@r spring @g @a 0.01\n@l spring @a @b k\n",
                 "k") == exactly(0.01596 / 3.994));
@@ -262,7 +262,7 @@ TEST_CASE("every law counts in the proof with its steepest slope", "[stability]"
   CHECK(limit("damper @m @g p") == exactly(2.0));
   CHECK(limit("nlSpring2 @m @g p 0.1 0.1") == exactly(3.8));
   CHECK(limit("nlSpring3 @m @g p 0.1 0.1") == exactly(3.8));
-  // Clipped at k, s d + c d^3 is 3 k - 2 s steep just before.
+  // s d + c d^3 clipped at k has the slope 3 k - 2 s just before the clip.
   CHECK(limit("nlSpringDamper @m @g 0.01 0.5 p 0.1") == exactly(3.82 / 3.0));
   CHECK(limit("nlPluck @m @g p 0.1 0.1") == exactly(38.0));
   CHECK(limit("nlBow @m @g p 0.1") == exactly(3.0));
@@ -272,12 +272,12 @@ TEST_CASE("every law counts in the proof with its steepest slope", "[stability]"
   CHECK(limit("nlContact @m @g 0.01 0.5 p 0.1 0.") == exactly(3.82 / 3.0));
   CHECK(highest("@p param 0.01\n@o osc 2. p 0.1 0. 0.\n", "p") == exactly(7.8));
   CHECK(highest("@p param 0.01\n@o osc 2. 0.1 p 0. 0.\n", "p") == exactly(3.95));
-  // Bows grow with the root of the factor: 4 - t - 2 (2/3) sqrt(t) = 0.
+  // Bows scale with the square root of the factor: 4 - t - 2 (2/3) sqrt(t) = 0.
   const Network bowed =
       network_of("@m mass 1. 0. 0.\n@g ground 0.\n@s spring @m @g 1\n@b nlBow @m @g 1 0.1\n");
   const double root = -2.0 / 3.0 + std::sqrt(4.0 / 9.0 + 4.0);
   CHECK(Stability(bowed, 1.0).stiffness_factor(as_written(bowed)) == exactly(root * root));
-  // At half the step K counts a quarter, Z a half: 4 = K/4 + Z.
+  // With half the step K counts a quarter, Z a half: 4 = K/4 + Z.
   const Network half = network_of("@p param 1.\n@o osc 1. p 0.1 0. 0.\n");
   CHECK(Stability(half, 0.5).safe_range(as_written(half), 0, 1.0)->highest == exactly(15.6));
 }
@@ -292,11 +292,11 @@ TEST_CASE("a parameter's limit is found through formulas", "[stability]") {
   CHECK(lowest(osc("2.", "0.1/p"), "p") == exactly(0.1 / 8.0));
   CHECK(lowest(osc("2*p", "0.1"), "p") == exactly(0.0125));
   CHECK(std::isinf(highest(osc("2.", "1+sin(p)"), "p")));
-  // One grows while the other falls: both are straight, so this is exact too.
+  // One grows while the other falls: both are affine, so this is exact, too.
   CHECK(highest("@p param 0.3\n@g ground 0.\n@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n"
                 "@l spring @g @a 8*p\n@n spring @g @b 3-p\n",
                 "p") == exactly(0.5));
-  // Nowhere, from where it stands, and on the other side of 0.
+  // No stable value around the start, nor on the other side of 0.
   const Network lost = network_of(
       "@p param 0.3\n@g ground 0.\n@a mass 1. 0. 0.\n"
       "@l spring @g @a p\n@n spring @g @a 5\n");
@@ -324,8 +324,8 @@ TEST_CASE("a proof holds for all values of the other parameters", "[stability]")
 }
 
 TEST_CASE("a place on a string counts with the masses around it", "[stability]") {
-  // A spring from 0 to the place between the first two of three masses, at a quarter of the way:
-  // 1/k = gT (4M - K)^-1 g with g = (3/4, 1/4, 0).
+  // A spring from 0 to a place between the first two of three masses, at a quarter of the way: 1/k
+  // = g^T (4M - K)^-1 g with g = (3/4, 1/4, 0).
   const std::string model =
       "@k param 0.1\n@u param 0.3125\n@d string 5 1. 0.5 0. 0. 0.\n@g ground 0.\n";
   Eigen::MatrixXd rest(3, 3);
@@ -337,17 +337,17 @@ TEST_CASE("a place on a string counts with the masses around it", "[stability]")
   CHECK(factor_of(model + "@l spring @g [@d 0.3125] 0.8\n") ==
         Approx(bound_limit / 2.8).epsilon(1e-14));
   CHECK(factor_of(model + "@l spring @g [@d u] 0.8\n") == Approx(bound_limit / 3.6).epsilon(1e-14));
-  // A place that moves may be anywhere: not above what any one mass allows.
+  // A moving place may be at any mass: the limit is at most what every single mass allows.
   const double live = highest(model + "@l spring @g [@d u] k\n", "k");
   for (int i = 0; i < 3; ++i) {
     CHECK(live <= 1.0 / support::inverse_of(rest)(i, i));
   }
-  // The middle one gives way least: exact, as it is held by nothing else that moves.
+  // The middle mass is the stiffest: exact, because no other moving link holds it.
   CHECK(live == Approx(1.0 / support::inverse_of(rest)(1, 1)).epsilon(2e-6));
 }
 
 TEST_CASE("links at places that move count at the worst of them", "[stability]") {
-  // Two strings joined wherever it may be: x_a^2 and x_b^2 twice each, at most at one mass.
+  // Two strings joined at moving places: x_a^2 and x_b^2 twice each, at most at one mass.
   Eigen::MatrixXd a(3, 3);
   a << 3.0, 0.5, 0.0, 0.5, 3.0, 0.5, 0.0, 0.5, 3.0;
   Eigen::MatrixXd b(2, 2);
@@ -357,8 +357,8 @@ TEST_CASE("links at places that move count at the worst of them", "[stability]")
                 "@b string 4 1. 0.3 0. 0. 0.\n@l spring [@a u] [@b v] k\n",
                 "k") == Approx(0.5 / most).epsilon(2e-6));
 
-  // Chains in a row, held at both ends and joined at places that sound moves; by the sum over all
-  // nodes the springs could be 0.83 of this. Nowhere is it more than that:
+  // Chains in a row, held at both ends and joined at places moved by audio. The sum over all nodes
+  // would allow springs of 0.83 of this. The limit is nowhere exceeded:
   const auto joined = [](const std::string& k, auto&& place) {
     std::string text = "@g ground 0.\n";
     for (int i = 1; i <= 4; ++i) {
@@ -381,13 +381,14 @@ TEST_CASE("links at places that move count at the worst of them", "[stability]")
   CHECK(k > 0.6);
   support::Random random(11);
   for (int i = 0; i < 200; ++i) {
-    const bool is_one = i % 4 == 0;  // all at the same mass
+    const bool is_one = i % 4 == 0;  // All at the same mass.
     const std::string same = show(random.uniform(0.0, 1.0));
     const Network fixed = network_of(
         joined(show(k), [&](int) { return is_one ? same : show(random.uniform(0.0, 1.0)); }));
     CHECK(Stability(fixed, 1.0).prove(as_written(fixed)) == Verdict::stable);
   }
-  // Too much of it is not called unstable that may never be, but what is too much anywhere is.
+  // A link that may be unstable only somewhere is not called unstable; one that is unstable
+  // everywhere is.
   const auto verdict = [&](const std::string& stiff) {
     const Network other =
         network_of(sound.substr(sound.find('\n') + 1).insert(0, "@k param " + stiff + "\n"));
@@ -404,18 +405,18 @@ TEST_CASE("the culprit is named with its line and its limit", "[stability]") {
         "4: unstable: the stiffness 2.5 of 'r' must stay below 2");
   CHECK(complaint_of(pair + "@r springDamper @m0 @m1 0.5 1.2") ==
         "4: unstable: the damping 1.2 of 'r' must stay below 0.75");
-  // One stiff link in a soft string; the string alone would do.
+  // One stiff link in a soft string, which is stable without it.
   CHECK(complaint_of(scenes::string("s", 10, "0.1", "0.") + "@x spring @s_m3 @s_m4 5\n")
             .find("27: unstable: the stiffness 5 of 'x' must stay below 1.8") == 0);
   // A light mass between soft springs: 4m > k + k.
   CHECK(complaint_of("@g ground 0.\n@m mass 0.01 0. 0.\n@a spring @g @m 0.1\n"
                      "@b spring @g @m 0.1\n@c spring @g @m 0.1\n") ==
         "2: unstable: the mass 0.01 of 'm' must stay above 0.075");
-  // Where one of the springs is enough, it is that one which an author would turn.
+  // If reducing one spring is enough, that spring is named.
   CHECK(complaint_of("@g ground 0.\n@m mass 0.1 0. 0.\n@a spring @g @m 0.1\n"
                      "@b spring @g @m 0.15\n@c spring @g @m 0.2\n") ==
         "5: unstable: the stiffness 0.2 of 'c' must stay below 0.15");
-  // What is written once and used often is named once.
+  // An argument used several times is named once.
   CHECK(complaint_of("@K param 1.5\n" + pair + "@a spring @m0 @m1 2*K\n@b spring @g @m0 2*K\n") ==
         "5: unstable: the stiffness 2*K = 3 of 'a' and 1 more must stay below 1.52786");
   CHECK(complaint_of("@d string 50 1. 1.2 0.01 0. 0.\n@out1 posOutput [@d 0.5]\n") ==
@@ -450,8 +451,8 @@ TEST_CASE("a link on a waveguide is stable unless it is negative", "[stability]"
         "5: may be unstable: the stiffness -K = -0.1 of 'a' is negative, so motion can "
         "grow without end");
   CHECK(complaint_of(held + "@a damper @g [@w 0.3] -1.5\n") ==
+  // A spring elsewhere does not compensate a negative one.
         "5: may be unstable: the damping -1.5 of 'a' is negative, so motion can grow without end");
-  // No spring beside it makes up for it that is not at the same place.
   CHECK(
       complaint_of(held + "@a spring @m [@w 0.3] -0.1\n@b spring @m @g 0.5\n") ==
       "5: may be unstable: the stiffness -0.1 of 'a' is negative, so motion can grow without end");
@@ -487,7 +488,7 @@ TEST_CASE("a formula's range holds all its values", "[stability]") {
     REQUIRE(formula);
     return formula_range(*formula, {{from, 2.0}, {to, 3.0}});
   };
-  // Exact where each parameter occurs once.
+  // Exact if each parameter occurs once.
   CHECK(range("q-p", 1.0, 1.5).lowest == 0.5);
   CHECK(range("q-p", 1.0, 1.5).highest == 2.0);
   CHECK(range("q/p", 0.5, 1.0).highest == 6.0);
@@ -499,7 +500,7 @@ TEST_CASE("a formula's range holds all its values", "[stability]") {
   CHECK(range("clamp(p,0.4,0.5)", 0.0, 1.0).highest == 0.5);
   CHECK(std::isinf(range("1/p", -1.0, 1.0).highest));
   CHECK(std::isinf(range("sqrt(p)", -1.0, 1.0).highest));
-  // Elsewhere wide, but not by much; and nothing is outside.
+  // Otherwise slightly wide, and never too narrow.
   for (const std::string text : {"p*p-p", "p/(1+p)", "p*exp(0-p)", "max(p,q)*sqrt(p)*p",
                                  "sin(3*p)*cos(2*p)", "min(p,1)/(p+q)"}) {
     const Range found = range(text, 0.0, 2.0);

@@ -1,5 +1,5 @@
-// Descriptors of timbre against numbers that were derived by hand or computed elsewhere, from the
-// definitions of the Timbre Toolbox; and where there is nothing to describe.
+// Timbre descriptors against values derived by hand or computed independently from the definitions
+// of the Timbre Toolbox, and sounds without descriptors.
 #include <complex>
 #include <limits>
 #include <numbers>
@@ -28,7 +28,7 @@ Approx near(double number) {
   return Approx(number).epsilon(1e-6).margin(1e-12);
 }
 
-// Harmonics of 220 Hz whose amplitudes are 1/k, every `step`th.
+// Harmonics of 220 Hz with amplitudes 1/k, every `step`th.
 std::vector<Partial> harmonics(int count, int step = 1) {
   std::vector<Partial> partials;
   for (int k = 1; k <= count; k += step) {
@@ -55,7 +55,7 @@ TEST_CASE("Four spectral lines have hand-computed descriptors", "[timbre]") {
   CHECK(shape->crest == near(1.6));
   CHECK(shape->entropy == near(0.923219672));
 
-  // The same energy rolls off at the same place, whether it is told as amplitudes or powers.
+  // The rolloff is the same for amplitudes and powers.
   const auto squared = spectral_shape(f, std::vector{1.0, 4.0, 9.0, 16.0}, of_power);
   CHECK(squared->rolloff95_hz == 400.0);
   CHECK(squared->centroid_hz == near(1000.0 / 3.0));  // (1 + 8 + 27 + 64) / 30 * 100
@@ -92,7 +92,7 @@ TEST_CASE("Odd harmonics have the descriptors of other programs", "[timbre]") {
   CHECK(*shape->kurtosis == near(3.30346491));
   CHECK(*shape->decrease == near(-2.0));
 
-  // Told as harmonics, the even ones are there and silent.
+  // As harmonics, the even ones are present and silent.
   const auto all = harmonics_of(harmonics(9, 2), 220.0);
   REQUIRE(all.size() == 9);
   CHECK(all[3].amplitude == 0.0);
@@ -116,7 +116,7 @@ TEST_CASE("Harmonic deviation and noisiness equal hand-computed values", "[timbr
   const auto shape = harmonic_shape(partials, 100.0);
   CHECK(shape->harmonic_deviation == near((0.0 + 2.0 + 2.0 + 1.5) / 4.0));
   CHECK(*noisiness(partials, 68.0) == near(0.5));  // 34 of 68
-  CHECK(*noisiness(partials, 10.0) == 0.0);        // more than there is
+  CHECK(*noisiness(partials, 10.0) == 0.0);        // More than the energy given.
   CHECK_FALSE(noisiness(partials, 0.0));
 }
 
@@ -133,7 +133,7 @@ TEST_CASE("An attack and a decay have the descriptors of other programs", "[timb
   CHECK(shape->temporal_centroid_s == near(0.1498184));
   CHECK(temporal_shape(squared, rate)->temporal_centroid_s == near(0.0790858));
   CHECK(shape->effective_duration_s == near(0.1386458));
-  CHECK(shape->log_attack_time == near(std::log10(0.009)));  // 10 % to 100 % of a straight line
+  CHECK(shape->log_attack_time == near(std::log10(0.009)));  // 10 % to 100 % of a straight line.
   CHECK(*shape->decay_slope == near(-std::log(1000.0)));
 }
 
@@ -185,7 +185,7 @@ TEST_CASE("Empty and silent input has no descriptors", "[timbre]") {
   CHECK(first->flatness == 0.0);
   CHECK(first->entropy == 0.0);
 
-  // A click: one sample long, whatever comes after.
+  // A click is one sample long.
   const auto click = temporal_shape(std::vector{1.0, 0.0, 0.0}, 1000.0);
   CHECK(click->log_attack_time == near(-3.0));
   CHECK(click->effective_duration_s == near(0.001));
@@ -228,7 +228,7 @@ TEST_CASE("A window's response equals the sum over its weights", "[timbre]") {
   for (const Window window : {Window::hann, Window::hamming, Window::blackman, Window::none}) {
     for (int round = 0; round < 50; ++round) {
       const std::size_t size = 8 + random.below(5000);
-      // Decays from none to gone within a frame; turns of whole bins, of none and of any.
+      // Decays from none to complete within a frame; rotations of whole bins, of none and of any.
       const double bin = 2.0 * std::numbers::pi / static_cast<double>(size);
       const std::complex<double> log_z(
           round % 3 == 0 ? 0.0 : -std::pow(10.0, random.uniform(-9.0, 0.0)),
@@ -273,7 +273,7 @@ TEST_CASE("Descriptors of modes in a frame match the synthesised sound", "[timbr
     CHECK(spectral_shape(lines, frame.kind)->centroid_hz ==
           Approx(frame.centroid_hz).margin(0.005));
   }
-  // Above half the rate nothing sounds; what nothing damps stays as loud.
+  // Partials above half the rate are left out; an undamped one keeps its level.
   const auto one =
       partials_in_frame(std::vector<DecayingPartial>{{30000.0, 1.0, 1.0}, {440.0, 1.0, -0.5}},
                         {Window::blackman, 512, 100000}, rate);
@@ -321,7 +321,7 @@ TEST_CASE("A frame of harmonics has the descriptors of other programs", "[timbre
   REQUIRE(shape);
   CHECK(shape->centroid_hz == near(1600.3929));
   CHECK(shape->spread_hz == near(1250.92932));
-  CHECK(*shape->skewness == Approx(0.98432).margin(5e-6));  // as many digits as are known
+  CHECK(*shape->skewness == Approx(0.98432).margin(5e-6));  // As many digits as are known.
   CHECK(*shape->kurtosis == Approx(2.82699).margin(5e-6));
   CHECK(shape->rolloff95_hz == 2812.5);
   const auto squared = frame_of(sound, of_power).shape;
@@ -339,7 +339,7 @@ TEST_CASE("A bell's frames match other programs and its own modes", "[timbre]") 
     SpectrumKind kind;
     double centroid_hz;
     double spread_hz;
-    double centroid_bound;  // of the closed form
+    double centroid_bound;  // Of the closed form.
     double spread_bound;
   } frames[] = {{0, magnitude, 555.519845, 566.711753, 0.01, 0.034},
                 {0, of_power, 352.572113, 281.340833, 0.0014, 0.052},
@@ -367,7 +367,7 @@ TEST_CASE("A bell's frames match other programs and its own modes", "[timbre]") 
 }
 
 TEST_CASE("Decaying partials are found between bins", "[timbre]") {
-  // Of a lone one the window's derivative gives the frequency itself.
+  // For a single partial the window's derivative gives the exact frequency.
   for (const double f : {440.0, 445.3, 451.0, 12345.6}) {
     std::vector<double> sound(2048);
     for (std::size_t n = 0; n < sound.size(); ++n) {
@@ -384,7 +384,7 @@ TEST_CASE("Decaying partials are found between bins", "[timbre]") {
     REQUIRE(loudest != partials.end());
     INFO(f);
     CHECK(loudest->frequency_hz == Approx(f).margin(2e-3));
-    // What it is in the middle of the frame, or nearly: the window is not all there.
+    // Close to its amplitude in the middle of the frame; the window does not cover all of it.
     CHECK(loudest->amplitude ==
           Approx(0.5 * std::exp(-std::log(1000.0) * 1024.0 / 48000.0)).epsilon(2e-3));
   }
@@ -403,12 +403,12 @@ TEST_CASE("A sound's harmonics have the descriptors of its partials", "[timbre]"
   }
   const auto stiff = frame_of(sound, magnitude, 220.0);
   REQUIRE(stiff.harmonics);
-  // Windows of neighbours overlap a little.
+  // The windows of neighbours overlap a little.
   CHECK(stiff.harmonics->inharmonicity == Approx(0.0331121446).epsilon(5e-3));
   CHECK(*stiff.harmonics->odd_to_even == Approx(3.23546315).epsilon(1e-3));
   CHECK(stiff.harmonics->tristimulus[0] == Approx(0.341417).epsilon(1e-3));
   CHECK(*stiff.noisiness < 1e-3);
-  // Nothing between the odd ones is taken for an even one.
+  // Nothing between odd harmonics counts as an even one.
   CHECK(frame_of(odd, magnitude, 220.0).harmonics->odd_to_even.value_or(1e9) > 1e6);
   CHECK(*find_f0(sound, 48000.0) == Approx(220.0).epsilon(1e-4));
   CHECK(*find_f0(odd, 48000.0) == Approx(220.0).epsilon(1e-4));
@@ -424,7 +424,7 @@ TEST_CASE("A sound's harmonics have the descriptors of its partials", "[timbre]"
 }
 
 TEST_CASE("An envelope follows the amplitude of an oscillation", "[timbre]") {
-  // A carrier that rises in 10 ms and then falls by 60 dB a second; the low-pass rounds the
+  // A carrier that rises in 10 ms and then falls by 60 dB per second; the low-pass rounds the
   // corners.
   std::vector<double> sound;
   for (int n = 0; n < 96000; ++n) {
@@ -459,7 +459,7 @@ TEST_CASE("A frame contains no NaN", "[timbre]") {
   CHECK_FALSE(silence.harmonics);
   CHECK_FALSE(frames.next(std::vector<double>(64, std::nan(""))).shape);
   const auto constant = frames.next(std::vector<double>(64, 1.0));
-  CHECK_FALSE(constant.flux);  // since silence
+  CHECK_FALSE(constant.flux);  // After silence.
   REQUIRE(constant.shape);
   CHECK(std::isfinite(constant.shape->centroid_hz));
   CHECK(*frames.next(std::vector<double>(64, 0.5)).flux == Approx(0.0).margin(1e-12));

@@ -1,5 +1,4 @@
-// The console: what it understands, what it completes, and what its commands do to a process that
-// is driven by hand.
+// The console: parsing, completion, and the effect of commands on a process driven by the test.
 #include "app/control/console.h"
 
 #include <unistd.h>
@@ -82,7 +81,7 @@ TEST_CASE("unstable models load only with --force, and parameters stay in the st
   folder.write("stiff.mdl", "@K param 1.\n@o osc 1. K 0. 0. 0.\n@out1 posOutput @o\n");
   const std::string wide = folder.write(
       "wide.toml", "model = \"stiff.mdl\"\n[parameters]\nK = { value = 1, range = [0, 9] }\n");
-  // K/M at 48 kHz is (44100/48000)^2 of what it is written as.
+  // K/M at 48 kHz is (44100/48000)^2 times the written value.
   CHECK(has(harness.say("load " + wide),
             "wide.toml:3:5: warning: 'K' is kept below 4.73876; above it the model is not stable"));
   CHECK(harness.say("set K 2") == "K = 2\n");
@@ -128,7 +127,7 @@ TEST_CASE("the examples of help are commands that work", "[console]") {
     rest.remove_prefix(line.size() + 1);
     INFO(line);
     CHECK(parse_command(line));
-    if (!has(line, "load ") && !has(line, "rec ")) {  // those need files
+    if (!has(line, "load ") && !has(line, "rec ")) {  // These need files.
       CHECK_FALSE(has(harness.say(line), "error"));
       ++tried;
     }
@@ -234,7 +233,7 @@ TEST_CASE("noteon sounds and panic silences", "[console]") {
   CHECK(harness.loudest(4) > 0.01);
   CHECK(has(harness.say("status"), "1 of 4"));
   CHECK(harness.say("panic").empty());
-  harness.loudest(40);  // the fade, and what takes DC away
+  harness.loudest(40);  // The fade and the DC filter.
   CHECK(harness.loudest(4) < 1e-6);
   CHECK(has(harness.say("noteon 128"), "error: the key must lie between 0 and 127"));
 }
@@ -261,7 +260,7 @@ TEST_CASE("pluck and bow use the first input that accepts them", "[console]") {
   REQUIRE(harness.process.from_console.pop(timed));
   CHECK(timed.event.gesture == Gesture::bow);
   CHECK(timed.event.value == -0.5);
-  CHECK(timed.event.value2 == -1.0);  // the pressure stays
+  CHECK(timed.event.value2 == -1.0);  // The pressure stays unchanged.
   CHECK(harness.say("bow 1 0.25 1").empty());
   REQUIRE(harness.process.from_console.pop(timed));
   CHECK(timed.event.value2 == 0.25);
@@ -336,7 +335,7 @@ TEST_CASE("the letter keys play notes", "[console]") {
   CHECK(has(harness.say("keys"), "needs a terminal"));
   harness.say("load " + write_triangle(folder));
   std::string typed = "awzsxKq";
-  typed.insert(2, 1, '\0');  // a second without a key
+  typed.insert(2, 1, '\0');  // A second without a key.
   std::size_t given = 0;
   harness.console.lend_keyboard([&](const auto& on_key) {
     while (given < typed.size() && on_key(typed[given++])) {
@@ -344,7 +343,7 @@ TEST_CASE("the letter keys play notes", "[console]") {
   });
   CHECK(has(harness.say("keys"), "q: back to the commands"));
   CHECK(given == typed.size());
-  std::vector<int> played;  // below 0: off
+  std::vector<int> played;  // Below 0: note off.
   TimedEvent timed;
   while (harness.process.from_console.pop(timed)) {
     const int key = timed.event.index;
@@ -355,7 +354,7 @@ TEST_CASE("the letter keys play notes", "[console]") {
 
 namespace {
 
-// Stands in for the standard input while it lives.
+// Replaces the standard input during its lifetime.
 class TypedInput {
  public:
   TypedInput() : before_(dup(STDIN_FILENO)) {
@@ -405,7 +404,7 @@ TEST_CASE("without a terminal, lines are read until quit", "[console]") {
   CHECK(has(harness.said, "model   none"));
   CHECK(has(harness.said, "no model is loaded yet"));
   CHECK(harness.said.find("model   none") ==
-        harness.said.rfind("model   none"));  // nothing after quit
+        harness.said.rfind("model   none"));  // Nothing is executed after quit.
 }
 
 TEST_CASE("the end of the input ends only the console", "[console]") {
@@ -417,7 +416,7 @@ TEST_CASE("the end of the input ends only the console", "[console]") {
                   [&](const std::string&) { promise.set_value(); }, {});
   {
     Terminal terminal(console, [&] { has_quit = true; });
-    input.type("status");  // without its line end
+    input.type("status");  // Without its line end.
     input.end();
     REQUIRE(promise.get_future().wait_for(patience) == std::future_status::ready);
   }

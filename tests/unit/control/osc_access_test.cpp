@@ -1,4 +1,4 @@
-// Who may send OSC, what a packet may reach, and how much is answered to whom.
+// OSC access: allowed senders, reachable files and the reply budget.
 #include <fcntl.h>
 #include <ifaddrs.h>
 #include <sys/stat.h>
@@ -41,7 +41,7 @@ struct Harness {
   DataFolder data;
   Process process{48000.0, false};
   Session session{process, {.compile = {.rate_hz = 48000.0}}, {}};
-  std::vector<std::string> news;  // of the server's thread; to be read when it has ended
+  std::vector<std::string> news;  // Written by the server's thread; read after it has ended.
   bool is_loaded = load("one", whole);
   std::unique_ptr<OscServer> server = open({.port = 0});
   Client client{server->port()};
@@ -68,7 +68,7 @@ struct Harness {
 
 }  // namespace
 
-// --- who may send -------------------------------------------------------------------------------
+// --- allowed senders -----------------------------------------------------------------------------
 
 TEST_CASE("allowed senders are parsed as addresses and networks", "[osc_access]") {
   const auto subnets = parse_subnets("192.168.1.77/24,10.0.0.5,172.16.0.0/12");
@@ -115,7 +115,7 @@ TEST_CASE("only named network senders are accepted", "[osc_access]") {
 }
 
 TEST_CASE("packets from other senders are counted and ignored", "[osc_access]") {
-  // An address of this machine's that is not 127.x, which others could have.
+  // An address of this machine other than 127.x, like a remote one.
   std::uint32_t own = 0;
   ifaddrs* all = nullptr;
   REQUIRE(getifaddrs(&all) == 0);
@@ -155,7 +155,7 @@ TEST_CASE("packets from other senders are counted and ignored", "[osc_access]") 
   CHECK(guest.ask(message("/status")).address == "/status.reply");
 }
 
-// --- how much is answered -----------------------------------------------------------------------
+// --- reply budget --------------------------------------------------------------------------------
 
 TEST_CASE("replies are limited to the bytes received plus a budget", "[osc_access]") {
   constexpr std::size_t question = 16;
@@ -229,7 +229,7 @@ TEST_CASE("memory is limited for any number of senders", "[osc_access]") {
   }
   CHECK(answered == AnswerBudget::max_senders + 1);
   CHECK(budget.senders() == AnswerBudget::max_senders + 1);
-  CHECK(budget.may_answer({0x0c000000, 1}, 1000 * ms));  // who has paid makes room
+  CHECK(budget.may_answer({0x0c000000, 1}, 1000 * ms));  // A sender without debt frees its entry.
 }
 
 TEST_CASE("a reply of many rows is sent in portions", "[osc_access]") {
@@ -254,7 +254,7 @@ TEST_CASE("a reply of many rows is sent in portions", "[osc_access]") {
     rows.push_back({i});
   }
   outlet.answer(to, rows);
-  outlet.answer(to, {{100}});  // comes behind them
+  outlet.answer(to, {{100}});  // Queued behind them.
   CHECK(collect() == 0);
   const int wait_ms = outlet.send_due();
   CHECK(wait_ms > 0);
@@ -264,7 +264,7 @@ TEST_CASE("a reply of many rows is sent in portions", "[osc_access]") {
   }
   CHECK(collect() == 101);
   CHECK(std::is_sorted(got.begin(), got.end()));
-  outlet.answer(to, {{101}});  // nothing waits before it
+  outlet.answer(to, {{101}});  // Sent without waiting.
   CHECK(collect() == 102);
   close(receiver);
 }
@@ -292,7 +292,7 @@ TEST_CASE("a description of a thousand parameters arrives complete and in order"
   for (std::size_t i = 0; i < 1000; ++i) {
     CHECK(rows[addresses().size() + i].text(0) == "/param/" + stem + std::to_string(1000 + i));
   }
-  // More was answered than was asked for: nothing else for a while, and that is said.
+  // The reply exceeded the budget: no further replies for a while, with one message about it.
   const auto pause = harness.client.receive();
   REQUIRE(pause);
   CHECK(pause->address == "/error");
@@ -314,7 +314,7 @@ TEST_CASE("a flood of queries is not amplified", "[osc_access]") {
   CHECK(static_cast<double>(harness.client.bytes_received) <=
         static_cast<double>(count * question.size()) + (seconds + 1.0) * AnswerBudget::bytes_per_s +
             one_answer);
-  // Another is answered all the same.
+  // Another client still gets replies.
   CHECK(Client(harness.server->port()).ask(message("/status")).address == "/status.reply");
 }
 
@@ -322,7 +322,7 @@ TEST_CASE("packets that the system lost are counted", "[osc_access]") {
   Harness harness;
   const Bytes packet =
       bundle(1, {message("/bend", {0.5f}), message("/done", {std::string(8000, 'x')})});
-  // Faster than anybody reads, until the socket's room has run over.
+  // Sends faster than the server reads, until the socket's buffer overflows.
   std::size_t sent = 0;
   std::size_t heard = 0;
   for (int round = 0; round < 100 && harness.session.status().dropped == 0; ++round) {
@@ -340,7 +340,7 @@ TEST_CASE("packets that the system lost are counted", "[osc_access]") {
   CHECK(heard + lost >= sent);
 }
 
-// --- what a packet reaches ----------------------------------------------------------------------
+// --- reachable files -----------------------------------------------------------------------------
 
 TEST_CASE("packets load only files below the program's folders", "[osc_access]") {
   namespace fs = std::filesystem;
@@ -406,10 +406,10 @@ TEST_CASE("packets load only files below the program's folders", "[osc_access]")
           name + std::string(".toml:1:9: error: its model is none of the "
                              "program's own, and OSC loads no others"));
     CHECK(harness.session.load_and_wait(presets /
-                                        (name + std::string(".toml"))));  // who sits here may
+                                        (name + std::string(".toml"))));  // A local user may.
   }
   CHECK(contains(harness.load_by_osc("password"), "password.toml:1:9: error: "));
-  // And what was loaded from here is still what sounds.
+  // The locally loaded model is still playing.
   CHECK(harness.session.load_and_wait(outside / "secret.mdl"));
   fs::remove_all(outside);
 }
@@ -483,7 +483,7 @@ TEST_CASE("replies contain no text of a file", "[osc_access]") {
   for (const std::string& text : presets) {
     check("presets/secret.toml", text);
   }
-  CHECK(quoting > models.size());  // whoever sits here is told the words
+  CHECK(quoting > models.size());  // A local user sees the quoted words.
   harness.server.reset();
   REQUIRE_FALSE(harness.news.empty());
   CHECK(contains(harness.news[0], "secret.mdl:1:"));

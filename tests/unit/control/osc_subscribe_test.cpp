@@ -1,4 +1,4 @@
-// What OSC tells by itself, lists and keeps; and how loud its notes are.
+// OSC subscriptions, lists and saving, and note velocities.
 #include <functional>
 
 #include "app/control/osc/server.h"
@@ -31,7 +31,7 @@ struct OscHarness {
   }
 };
 
-// The next message at the address; what comes before it is passed over.
+// Returns the next message with this address, skipping others.
 Answer next(Client& client, const std::string& address) {
   for (int i = 0; i < 100; ++i) {
     auto answer = client.receive();
@@ -58,16 +58,16 @@ TEST_CASE("subscribers receive every change from any source", "[osc_subscribe]")
   const Answer lease = listener.ask(message("/subscribe", {30}));
   CHECK(lease.address == "/subscribe.reply");
   CHECK(value(lease) == 30.0f);
-  CHECK(next(listener, "/loaded").text(0) == "tri");  // all that is, to begin with
+  CHECK(next(listener, "/loaded").text(0) == "tri");  // The complete state first.
   CHECK(value(next(listener, "/param/m_K")) == 0.1f);
 
-  h.say("set m_K 0.15");  // by the console
+  h.say("set m_K 0.15");  // Changed by the console.
   CHECK(value(next(listener, "/param/m_K")) == 0.15f);
   h.play();
-  other.send(message("/param/m_K", {0.125f}));  // by somebody else
+  other.send(message("/param/m_K", {0.125f}));  // Changed by another client.
   CHECK(value(next(listener, "/param/m_K")) == 0.125f);
   h.play();
-  h.say("learn m_K");  // by a knob
+  h.say("learn m_K");  // Changed by a knob.
   const auto turn = [&](double value) {
     const TimedEvent event{{.kind = EventKind::controller, .index = 7, .value = value}};
     REQUIRE(h.process.send(h.process.from_midi, {&event, 1}));
@@ -79,7 +79,7 @@ TEST_CASE("subscribers receive every change from any source", "[osc_subscribe]")
   }
   turn(1.0);
   CHECK(value(next(listener, "/param/m_K")) == 0.2f);
-  h.say("load triangle");  // and another scene
+  h.say("load triangle");  // Another scene.
   CHECK(next(listener, "/loaded").text(0) == "triangle");
 
   listener.send(message("/unsubscribe"));
@@ -125,7 +125,7 @@ TEST_CASE("models and presets are listed over OSC, and saved", "[osc_subscribe]"
   CHECK(std::get<std::int32_t>(next(client, "/models.end").values.at(0)) == 1);
 
   CHECK(client.ask(message("/preset/save", {"mine"})).address == "/done");
-  CHECK(client.ask(message("/preset/save", {"mine"})).address == "/fail");  // never over one
+  CHECK(client.ask(message("/preset/save", {"mine"})).address == "/fail");  // Never overwrites.
   CHECK(client.ask(message("/preset/save", {"tri"})).address == "/fail");
   CHECK(client.ask(message("/preset/save", {"../../mine"})).address == "/fail");
   CHECK(client.ask(message("/preset/save", {"/tmp/mine"})).address == "/fail");
@@ -156,8 +156,8 @@ TEST_CASE("an integer velocity is MIDI's, a float is a share", "[osc_subscribe]"
   CHECK(velocity(1.0, "ii") == 1.0 / 127.0);
   CHECK(velocity(1.0, "if") == 1.0);
   CHECK(velocity(0.5, "id") == 0.5);
-  CHECK(velocity(100.0, "if") == 100.0 / 127.0);  // no share: above 1
-  CHECK(velocity(1.0, "") == 1.0 / 127.0);        // of a score
+  CHECK(velocity(100.0, "if") == 100.0 / 127.0);  // Above 1, so not a share.
+  CHECK(velocity(1.0, "") == 1.0 / 127.0);        // From a score.
 }
 
 }  // namespace ressort::osc_subscribe_test

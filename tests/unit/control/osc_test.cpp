@@ -24,7 +24,8 @@ namespace {
 constexpr double rate_hz = 48000.0;
 constexpr std::size_t period = 256;
 
-// --- a client, and a process that the test drives -----------------------------------------------
+// --- a client, and a process driven by the test
+// ---------------------------------------------------
 
 std::unique_ptr<OscServer> open_server(Process& process, Session& session) {
   auto server = OscServer::open({.port = 0}, process, session, {});
@@ -32,7 +33,7 @@ std::unique_ptr<OscServer> open_server(Process& process, Session& session) {
   return *std::move(server);
 }
 
-// Two masses that a push moves at once and that are still again long before the next.
+// Two masses that a push moves at once and that come to rest long before the next.
 struct Harness {
   DataFolder data;
   Process process{rate_hz, false};
@@ -55,7 +56,7 @@ struct Harness {
       "@out1 posOutput @m_a\n"
       "@out2 posOutput @m_b\n";
 
-  // An hour ahead, so that however slow this machine is, the process is never behind its time.
+  // An hour ahead, so that the process is never late on a slow machine.
   std::int64_t start_ns = monotonic_ns() + 3600'000'000'000;
   std::array<std::vector<float>, 2> sound;
 
@@ -76,7 +77,7 @@ struct Harness {
     }
   }
 
-  // The time tag for a moment of the driven clock.
+  // Returns the time tag for a moment of the simulated clock.
   std::uint64_t tag(std::int64_t time_ns) const {
     const std::int64_t wall_ns = time_ns + wall_offset_ns;
     return (static_cast<std::uint64_t>(wall_ns / 1'000'000'000 + 2208988800) << 32) +
@@ -88,7 +89,7 @@ struct Harness {
     return wall.tv_sec * 1'000'000'000 + wall.tv_nsec - monotonic_ns();
   }();
 
-  // The frames where a channel begins to sound after a silence.
+  // Returns the frames where a channel starts to sound after silence.
   std::vector<std::int64_t> onsets(std::size_t channel) const {
     std::vector<std::int64_t> frames;
     std::size_t still = period;
@@ -177,7 +178,7 @@ TEST_CASE("status and describe reply in full", "[osc]") {
   rows.pop_back();
   CHECK(rows.size() == addresses().size() + 2);
   CHECK(has(rows[0], "/describe.reply", "/note/on", "note"));
-  // Its value, its range and where it is stable are numbers.
+  // Its value, range and stable range are numbers.
   const Answer& parameter = rows.back();
   CHECK(parameter.text(0) == "/param/m_Z");
   CHECK(parameter.text(1) == "f");
@@ -194,7 +195,7 @@ TEST_CASE("every figure has a name, a meaning and at most one place in the reply
     CHECK_FALSE(row.does.empty());
     CHECK((row.place == not_in_reply || places.emplace(row.place, row.name).second));
   }
-  // Clients count on these.
+  // Clients rely on these positions.
   std::string order;
   for (const auto& [place, name] : places) {
     order += std::string(name) + " ";
@@ -239,7 +240,7 @@ TEST_CASE("the messages of a bundle act together", "[osc]") {
   CHECK(second.event.index == 64);
   CHECK(first.timing == TimedEvent::When::at_frame);
   CHECK(second.timing == TimedEvent::When::at_frame);
-  CHECK(std::abs(first.when - 48000) < 48);  // the two clocks' offset is measured twice
+  CHECK(std::abs(first.when - 48000) < 48);  // The offset of the two clocks is measured twice.
   CHECK(first.when == second.when);
 }
 
@@ -248,14 +249,14 @@ TEST_CASE("time tags keep their distances to the frame", "[osc]") {
   CHECK(has(harness.client.ask(bundle(harness.tag(harness.time_ns(0)), {message("/panic")})),
             "/error", "/panic", "no audio"));
 
-  // The distance is no whole number of blocks, and the audio thread is never quite in time.
+  // The distance is not a whole number of blocks, and block times have jitter.
   constexpr std::int64_t distance = 31007;
   constexpr std::uint64_t count = 24;
   const std::uint64_t first_tag = harness.tag(harness.time_ns(9600) + 7777);
   std::mt19937 random(1);
   std::uniform_int_distribution<std::int64_t> jitter_ns(-2'000'000, 2'000'000);
   for (std::uint64_t k = 0; k < count; ++k) {
-    const std::uint64_t offset = (k * distance << 32) / 48000;  // to the last bit of a tag
+    const std::uint64_t offset = (k * distance << 32) / 48000;  // To the last bit of a tag.
     while (static_cast<std::int64_t>(harness.sound[0].size()) <
            static_cast<std::int64_t>(k) * distance + 1) {
       harness.drive(1, jitter_ns(random));
@@ -266,12 +267,12 @@ TEST_CASE("time tags keep their distances to the frame", "[osc]") {
   harness.drive(100);
   const auto onsets = harness.onsets(0);
   REQUIRE(onsets.size() == count);
-  CHECK(std::abs(onsets[0] - 9600) < 150);  // as exact as the first block's clock reading
+  CHECK(std::abs(onsets[0] - 9600) < 150);  // As exact as the first block's clock reading.
   for (std::size_t k = 1; k < count; ++k) {
     CHECK(onsets[k] - onsets[k - 1] == distance);
   }
 
-  // A time that has passed acts at once, and whoever asked for it hears of it.
+  // A time in the past acts immediately, and the sender is told.
   const auto now = static_cast<std::int64_t>(harness.sound[0].size());
   const auto late = harness.client.ask(
       bundle(harness.tag(harness.time_ns(now - 24000)), {message("/in/1/force", {0.1})}));
@@ -291,7 +292,7 @@ TEST_CASE("time tags follow the clock when the audio has stood still", "[osc]") 
   harness.client.send(bundle(harness.tag(harness.time_ns(9600)), {message("/in/1/force", {0.1})}));
   CHECK(harness.client.sync().empty());
   harness.drive(50);
-  // Every block is 50 ms later than the frames before it say: 2400 frames fewer until a tag.
+  // Every block is 50 ms later than its frame number implies: 2400 frames fewer until a tag.
   harness.drive(1, 50'000'000);
   harness.client.send(bundle(harness.tag(harness.time_ns(24000)), {message("/in/1/force", {0.1})}));
   CHECK(harness.client.sync().empty());
@@ -343,7 +344,7 @@ TEST_CASE("loading replies done or fail with the client's ID", "[osc]") {
   CHECK(has(harness.client.ask(message("/model/load", {""})), "/fail", "/model/load",
             "expected the name of a model or a preset"));
 
-  // The server may end while a load is under way.
+  // The server may end during a load.
   for (int i = 0; i < 8; ++i) {
     harness.client.send(message("/model/load", {"two", i}));
   }
@@ -382,7 +383,7 @@ TEST_CASE("a bundle without room is rejected whole, and immediate events are acc
               "refused whole: 4096 events can wait for their time; there is no room for 1500 "
               "events more; try again later"));
     CHECK(harness.process.meters().dropped == 1500u * (static_cast<unsigned>(i) + 1));
-    harness.drive(4);  // the audio thread has taken them all, and they still wait
+    harness.drive(4);  // The audio thread has taken all of them, and they are still waiting.
   }
   CHECK(harness.onsets(0).empty());
   harness.client.send(message("/in/1/force", {0.1}));
@@ -454,7 +455,7 @@ TEST_CASE("ten thousand malformed packets do not disturb the server or the sound
       bundle(1, {message("/note/on", {60, 100}), message("/in/1/force", {0.5})}),
       bundle(harness.tag(harness.time_ns(9600)),
              {bundle(1, {message("/panic")}), message("/in/1/force", {0.5})})};
-  Client other(harness.server->port());  // who is answered while the first has asked too much
+  Client other(harness.server->port());  // Gets replies while the first client is over its budget.
   std::mt19937 random(20240607);
   const auto below = [&](std::size_t limit) {
     return std::uniform_int_distribution<std::size_t>(0, limit - 1)(random);

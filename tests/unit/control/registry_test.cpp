@@ -1,4 +1,4 @@
-// Addresses, scores and patterns: what people ask for, and what they are told when it cannot be.
+// Addresses, scores and patterns, and the errors for invalid ones.
 #include "app/control/registry.h"
 
 #include <set>
@@ -10,7 +10,7 @@ namespace {
 
 using namespace support;
 
-// Input 1 is a hand that plucks, input 2 one that bows, input 3 a force.
+// Input 1 is plucked, input 2 bowed, input 3 a force.
 const Instrument& instrument() {
   static const Instrument made = [] {
     Preset preset;
@@ -38,7 +38,7 @@ const Instrument& instrument() {
   return made;
 }
 
-// A call as it is typed.
+// A message as typed.
 Message call(const std::string& text) {
   const auto words = split_words(text);
   Message made{words.at(0), {}};
@@ -96,7 +96,7 @@ TEST_CASE("every playing address becomes its event", "[registry]") {
   of_id("/note/on 60 127 0", EventKind::note_on, 60, 1.0, 0);
   of_id("/note/on 60 127 16", EventKind::note_on, 60, 1.0, 16);
   of_id("/note/off 60 127 2", EventKind::note_off, 60, 1.0, 2);
-  of_id("/note/hz 1 450 127", EventKind::note_on, 69, 1.0, 1, 450.0);  // 69.39 is nearest to 69
+  of_id("/note/hz 1 450 127", EventKind::note_on, 69, 1.0, 1, 450.0);  // 69.39 is nearest to 69.
   of_id("/note/hz 1 20000 127", EventKind::note_on, 127, 1.0, 1, 20000.0);
   of_id("/note/hz 4 450 0", EventKind::controller, 123, 0.0, 4);
   of_id("/note/end 4", EventKind::controller, 123, 0.0, 4);
@@ -109,8 +109,8 @@ TEST_CASE("every playing address becomes its event", "[registry]") {
   check(event("/pressure 0"), EventKind::pressure, 0, 0.0, 0);
   check(event("/bend -0.5"), EventKind::bend, 0, -0.5, 0);
   CHECK(event("/panic").kind == EventKind::panic);
-  CHECK(event("/panic 1").kind == EventKind::panic);  // a button's value
-  // What names a part of the model is for this model only.
+  CHECK(event("/panic 1").kind == EventKind::panic);  // A button's value.
+  // Events that name a part of the model are valid for this model only.
   check(event("/param/s_K 0.15"), EventKind::parameter, 1, 0.15, 9);
   check(event("/in/1/position -7.5"), Gesture::position, 1, -7.5, 9);
   check(event("/in/3/force 0.1"), Gesture::force, 3, 0.1, 9);
@@ -118,7 +118,7 @@ TEST_CASE("every playing address becomes its event", "[registry]") {
   CHECK(event("/in/3/force 0.1 2").value2 == 2.0);
   check(event("/in/1/pluck 0.5"), Gesture::pluck, 1, 0.5, 9);
   check(event("/in/2/bow -1"), Gesture::bow, 2, -1.0, 9);
-  CHECK(event("/in/2/bow 1").value2 < 0.0);  // the pressure stays as it is
+  CHECK(event("/in/2/bow 1").value2 < 0.0);  // The pressure stays unchanged.
   CHECK(event("/in/2/bow 1 0.25").value2 == 0.25);
   check(event("/finger 0.5"), EventKind::custom, 2, 0.5, 9);
   const auto both = to_events(call("/both 0.25"), instrument(), 9);
@@ -150,7 +150,7 @@ TEST_CASE("masses are struck by name, those of macros by number", "[registry]") 
     CHECK((*events)[0].model == 9);
     return std::pair{(*events)[0].value, (*events)[0].value2};
   };
-  // Written out, the string's masses come after the two, and after the place on it.
+  // In the expanded network the string's masses come after the two, and after the place on it.
   CHECK(struck("/mass/a/strike 1") == std::pair{0.4, 0.0});
   CHECK(struck("/mass/a/strike -0.5") == std::pair{-0.2, 0.0});
   CHECK(struck("/mass/s:2/strike 1") == std::pair{0.4, 4.0});
@@ -179,7 +179,7 @@ TEST_CASE("a parameter driven by an input cannot be set", "[registry]") {
   const auto one = to_events(call("/param/K 0.1"), compiled->instrument, 9);
   REQUIRE_FALSE(one);
   CHECK(one.error().message == "/param/K: input 2 gives it, sample by sample; it cannot be set");
-  // Among others it is left out.
+  // A pattern skips it.
   const auto all = to_events(call("/param/* 0.1"), compiled->instrument, 9);
   REQUIRE(all);
   REQUIRE(all->size() == 1);
@@ -194,7 +194,7 @@ TEST_CASE("a parameter is limited to its range, and a pattern matches several", 
   REQUIRE(events->size() == 2);
   CHECK((*events)[0].value == 0.06);
   CHECK((*events)[1].value == 0.01);
-  // What only asks plays nothing.
+  // A query plays nothing.
   check_error("/param/s_K", "/param/s_K: the value is missing");
   check_error("/status", "unknown address '/status'; /describe lists all addresses");
   check_error("/model/load x", "unknown address '/model/load'; /describe lists all addresses");
@@ -269,7 +269,7 @@ TEST_CASE("every row is found by its address and has an interface", "[registry]"
     CHECK(find_row(address).row == &row);
     CHECK(find_row(address).name == name);
     CHECK(is_reserved(address));
-    // What it says of its arguments is what it takes.
+    // The declared arguments are accepted.
     Message least{address, {}};
     for (const CallArgument& argument : row.arguments) {
       if (!argument.word.empty() && !argument.is_text) {
@@ -374,7 +374,7 @@ TEST_CASE("patterns match according to the OSC specification", "[registry]") {
   CHECK(fits("*_K", "string_K"));
   CHECK(fits("*a*b*", "xxaxxbxx"));
   CHECK_FALSE(fits("*a*b*", "xxbxxaxx"));
-  CHECK_FALSE(fits("/*", "/a/b"));  // a star stays between two slashes
+  CHECK_FALSE(fits("/*", "/a/b"));  // A star does not match a slash.
   CHECK(fits("/*/b", "/a/b"));
   CHECK(fits("m_?", "m_K"));
   CHECK_FALSE(fits("m_?", "m_"));
@@ -392,7 +392,7 @@ TEST_CASE("patterns match according to the OSC specification", "[registry]") {
 }
 
 TEST_CASE("patterns match in bounded time and memory", "[registry]") {
-  // The test's time limit is what an exponential search would break.
+  // An exponential search would exceed the test's time limit.
   const std::string name(5000, 'a');
   std::string stars;
   for (int i = 0; i < 2000; ++i) {

@@ -1,4 +1,4 @@
-// Timbre that is asked for of what sounds, at the console and by OSC: turned, told, taken back.
+// Shaping the current sound from the console and by OSC: changes, messages, undo.
 #include <cmath>
 
 #include "app/control/osc/server.h"
@@ -13,8 +13,8 @@ const char* const string_text =
     "@k param 0.1\n@z param 0.002\n@s string 20 1. k z 0. 0.\n@in1 frcInput [@s 0.3]\n"
     "@out1 posOutput [@s 0.71]\n";
 
-// Of 18 masses that move, by hand: lambda = K (2 sin(pi / 2 / 19))^2, zeta = Z times the same;
-// f and T60 of the published scheme.
+// For 18 moving masses, by hand: lambda = K (2 sin(pi / 2 / 19))^2, zeta = Z times the same; f and
+// T60 of the published scheme.
 double stiffness_for(double f0_hz, double t60_s, double rate_hz) {
   const double r = std::pow(10.0, -3.0 / (rate_hz * t60_s));
   const double lambda = 1.0 + r * r - 2.0 * r * std::cos(2.0 * M_PI * f0_hz / rate_hz);
@@ -32,7 +32,7 @@ struct StringHarness {
   double now(const char* name) { return harness.session.parameter(name).value_or(0.0); }
 };
 
-// With single blanks.
+// Collapses blanks.
 std::string squeezed(const std::string& text) {
   std::string out;
   for (const char c : text) {
@@ -53,7 +53,7 @@ TEST_CASE("the console shapes the current sound, and undo reverts it", "[shape_t
   CHECK(has(squeezed(told), " Hz 300.0 Hz 300.0 Hz 0.00 JND"));
   CHECK(has(squeezed(told), "2.00 s 2.00 s 0.00 JND"));
   CHECK(has(told, "'undo' takes it back"));
-  // Within a hundredth of what is noticed: 0.05 cents.
+  // Within a hundredth of a just noticeable difference: 0.05 cents.
   CHECK(fixture.now("k") == Approx(stiffness_for(300.0, 2.0, 48000.0)).epsilon(1e-4));
   h.play();
   CHECK(has(h.say("undo"), "k = 0.1"));
@@ -81,7 +81,7 @@ TEST_CASE("keys stay in tune after shaping", "[shape_told]") {
   constexpr double a_tenth_of_a_cent = 440.0 * 5.8e-5;
   CHECK(pitch_hz() == Approx(440.0).margin(a_tenth_of_a_cent));
   const double before = *h.session.parameter("m_K");
-  // A note that sounds goes on, and is in tune at once.
+  // A sounding note continues and is in tune at once.
   h.say("noteon 69 60");
   h.loudest(5);
   const std::string told = h.say("shape inharmonicity 0.0001");
@@ -98,7 +98,7 @@ TEST_CASE("an attack can be printed and requested", "[shape_told]") {
   StringHarness fixture;
   Harness& h = fixture.harness;
   const std::string told = squeezed(h.say("shape t60 2"));
-  // Told though it was not asked for: what strikes a string rises as fast as the low-pass of 50 Hz.
+  // Printed although not requested: a struck string rises as fast as the low-pass of 50 Hz.
   CHECK(has(told, "attack "));
   CHECK_FALSE(has(told, "attack - -"));
   h.play();

@@ -1,4 +1,4 @@
-// Sums of damped sinusoids against sums written out, and the fit from wrong starts.
+// Sums of damped sinusoids against direct summation, and the fit from wrong starts.
 #include "core/identification/damped.h"
 
 #include "core/identification/fit.h"

@@ -1,5 +1,5 @@
-// Modes out of recordings: IR-T1 to IR-T7 and IR-T9 with the tolerances that were set for them, and
-// sounds that are not what the method assumes.
+// Modes from recordings: IR-T1 to IR-T7 and IR-T9 with their required tolerances, and sounds that
+// violate the method's assumptions.
 #include "core/identification/identify.h"
 
 #include "core/identification/shapes.h"
@@ -42,7 +42,7 @@ TEST_CASE("IR-T1: thirty modes without noise are found to rounding precision", "
   const std::vector<KnownMode> known = thirty(seed);
   const Identification found = identified({ringing(known, 3.0)});
   const Misses worst = worst_of(known, found);
-  CHECK(worst.frequency_hz < 1e-9);  // wanted: 1e-3 Hz, 0.01 %, 0.001 dB, 1e-3
+  CHECK(worst.frequency_hz < 1e-9);  // Required: 1e-3 Hz, 0.01 %, 0.001 dB, 1e-3.
   CHECK(worst.t60_percent < 1e-8);
   CHECK(worst.amplitude_db < 1e-9);
   CHECK(worst.phase_rad < 1e-9);
@@ -73,7 +73,8 @@ TEST_CASE(
   REQUIRE(found.modes.size() == known.size());
   for (std::size_t k = 0; k < known.size(); ++k) {
     INFO(known[k].frequency_hz << " Hz");
-    // Of one mode in white noise: 4 alpha^(3/2) sigma / A per sample, of alpha and of omega.
+    // Bound for one mode in white noise: 4 alpha^(3/2) sigma / A per sample, for alpha and for
+    // omega.
     const double bound =
         4.0 * std::pow(known[k].alpha() / 44100.0, 1.5) * deviation / known[k].amplitude * 44100.0;
     const IdentifiedMode& mode = found.modes[k];
@@ -111,7 +112,7 @@ TEST_CASE("IR-T5: modes with a T60 of 10 to 50 ms are found in short, long and n
   const std::vector<double> clean = ringing(damped, 3.0);
   const Misses worst =
       worst_of(damped, identified({with_noise(clean, 1e-3 * peak_of(clean), random)}));
-  CHECK(worst.frequency_hz < 1.2);  // 5 times the bound of the worst
+  CHECK(worst.frequency_hz < 1.2);  // 5 times the worst bound.
   CHECK(worst.t60_percent < 2.0);
 }
 
@@ -252,7 +253,7 @@ TEST_CASE("Clipped samples are extrapolated from the sound after them", "[identi
 }
 
 TEST_CASE("A long contact does not change the modes", "[identify]") {
-  // A hammer that stays 2 ms: half a sine, with noise.
+  // A hammer with 2 ms of contact: half a sine, with noise.
   const std::vector<KnownMode> known = {{230.0, 3.0, 0.5, 0.0},
                                         {641.0, 2.0, 0.4, 0.0},
                                         {1007.0, 1.4, 0.3, 0.0},
@@ -305,7 +306,7 @@ TEST_CASE("Stated uncertainties match the errors", "[identify]") {
       }
     }
   }
-  // The mean of 96 squares of standard deviation 1: 1, give or take 0.15.
+  // The mean of 96 squares with standard deviation 1: 1 +- 0.15.
   for (const double mean : sum) {
     CHECK(mean > 0.6);
     CHECK(mean < 1.5);
@@ -325,8 +326,7 @@ TEST_CASE("A mode limit keeps the strongest modes, none below the floor", "[iden
   CHECK(two.modes[1].frequency_hz.value == Approx(500.0));
   CHECK(identified(sound, 44100.0, {.floor_db = -21.0}).modes.size() == 3);
   CHECK(identified(sound, 44100.0, {.floor_db = -19.0}).modes.size() == 2);
-  // What was left out is part of what the modes leave: -20.4 dB of it, and of the octave about 800
-  // Hz all.
+  // Omitted modes are part of the residual: -20.4 dB in total, and all of the octave around 800 Hz.
   CHECK(two.residual_db == Approx(-20.4).margin(0.1));
   for (const OctaveResidual& octave : two.octaves) {
     if (octave.low_hz < 800.0 && octave.high_hz > 800.0) {
@@ -371,7 +371,7 @@ TEST_CASE("Identification can be cancelled at any time", "[identify]") {
 }
 
 TEST_CASE("A body made from a recording reproduces it after one impulse", "[identify]") {
-  // All from rest, some the other way round, heard in two places.
+  // All start from rest, some with inverted sign, heard at two places.
   std::vector<KnownMode> known = thirty(91);
   std::vector<KnownMode> other = known;
   for (std::size_t k = 0; k < known.size(); ++k) {

@@ -1,5 +1,4 @@
-// The panel by bytes on a socket: who is let in, and what is answered. What it draws:
-// panel_test.cpp.
+// The panel's HTTP by bytes on a socket: access and replies. panel_test.cpp tests the drawing.
 #include "app/panel/panel.h"
 
 #include <arpa/inet.h>
@@ -32,7 +31,7 @@ namespace {
 using namespace support;
 using namespace std::chrono_literals;
 
-// --- who is let in ------------------------------------------------------------------------------
+// --- access --------------------------------------------------------------------------------------
 
 TEST_CASE("hosts and origins must match exactly", "[panel_http]") {
   const PanelAccess access(9788, {}, "secret", false);
@@ -132,7 +131,7 @@ struct Stage {
     REQUIRE(::send(socket, text.data(), text.size(), MSG_NOSIGNAL) ==
             static_cast<ssize_t>(text.size()));
   }
-  // At most so many bytes, or until the other side has said all.
+  // Receives at most `most` bytes, or until the other side closes.
   static std::string receive(int socket, std::size_t most = 1 << 22) {
     std::string all;
     char bytes[4096];
@@ -192,7 +191,8 @@ TEST_CASE("requests that a foreign page could make are refused", "[panel_http]")
     CHECK(with_host(host) == 403);
   }
   CHECK(stage.status("GET /describe HTTP/1.1\r\n\r\n") == 403);
-  CHECK(stage.status(stage.get("/describe", "Host: " + stage.host + "\r\n")) == 403);  // twice
+  // Sent twice.
+  CHECK(stage.status(stage.get("/describe", "Host: " + stage.host + "\r\n")) == 403);
   for (const std::string origin :
        {"http://evil.com", "null", "https://127.0.0.1", "http://127.0.0.1"}) {
     INFO(origin);
@@ -238,7 +238,7 @@ TEST_CASE("a request body must have a known, small length", "[panel_http]") {
   CHECK(stage.status(head + octets + "Transfer-Encoding: chunked\r\n\r\n0\r\n\r\n") == 400);
   CHECK(stage.status(stage.post(message("/panic"), "Content-Encoding: gzip\r\n")) == 400);
   CHECK(stage.status(stage.get("/", "Range: bytes=0-1,0-1,0-1\r\n")) == 400);
-  // No longer than any packet of OSC, and rubbish: an answer that says so, and nothing else.
+  // An invalid body of the largest OSC packet size gets an error reply only.
   const std::string said = stage.ask(stage.post(Bytes(65507, 'x')));
   CHECK(said.find("/error") != said.npos);
 }
@@ -252,7 +252,7 @@ TEST_CASE("a packet by HTTP acts like one by UDP", "[panel_http]") {
   CHECK(asked.find("/param/m_K") != asked.npos);
   const std::string wrong = Stage::body(stage.ask(stage.post(message("/nonsense"))));
   CHECK(wrong.find("/error") != wrong.npos);
-  // What one says the others hear; and what fails later is told as news.
+  // Other viewers receive one viewer's changes, and later failures as news.
   const int listener = stage.connect();
   Stage::send(listener, stage.get("/events"));
   std::string events;
@@ -277,7 +277,7 @@ TEST_CASE("the drawing has positions, and four viewers can watch", "[panel_http]
   const Stage stage;
   const auto network = nlohmann::json::parse(Stage::body(stage.ask(stage.get("/network"))));
   CHECK(network["dots"] == 2);
-  CHECK(network["x"].size() == 3);  // and a ground
+  CHECK(network["x"].size() == 3);  // Two masses and a ground.
   CHECK(network["links"].size() == 2);
   CHECK(network["inputs"][0][0] == 1);
   const auto modes = nlohmann::json::parse(Stage::body(stage.ask(stage.get("/modes?count=9"))));
@@ -292,7 +292,7 @@ TEST_CASE("the drawing has positions, and four viewers can watch", "[panel_http]
     CHECK(first.find("Content-Type: application/octet-stream") != first.npos);
   }
   CHECK(stage.status(stage.get("/motion")) == 503);
-  CHECK(stage.status(stage.get("/describe")) == 200);  // all others are served
+  CHECK(stage.status(stage.get("/describe")) == 200);  // All other requests are served.
   close(viewers.back());
   viewers.pop_back();
   int status = 503;
@@ -324,11 +324,11 @@ TEST_CASE("the addresses of OSC are a tree that OSCQuery programs read", "[panel
   CHECK(root["CONTENTS"]["panic"]["TYPE"] == "N");
   CHECK(root["CONTENTS"]["in"]["CONTENTS"]["1"]["CONTENTS"].contains("force"));
   CHECK_FALSE(root["CONTENTS"]["in"]["CONTENTS"]["1"]["CONTENTS"].contains("position"));
-  // Every node says where it is, and where it is it says the same.
+  // Every node states its path, and that path returns the same node.
   const std::function<std::size_t(const nlohmann::json&)> visit =
       [&](const nlohmann::json& node) -> std::size_t {
     const auto path = node.at("FULL_PATH").get<std::string>();
-    if (path != "/describe" && path != "/modes") {  // these the page asks for
+    if (path != "/describe" && path != "/modes") {  // The page requests these itself.
       CHECK(read(path) == node);
     }
     std::size_t count = 1;
@@ -350,7 +350,7 @@ TEST_CASE("the addresses of OSC are a tree that OSCQuery programs read", "[panel
   CHECK(ask("/param?VALUE").starts_with("HTTP/1.1 204"));
   CHECK(ask("/param/nothing").starts_with("HTTP/1.1 404"));
   CHECK(read("/?HOST_INFO")["NAME"] == "ressort");
-  CHECK_FALSE(read("/?HOST_INFO").contains("OSC_PORT"));  // this one is not heard by UDP
+  CHECK_FALSE(read("/?HOST_INFO").contains("OSC_PORT"));  // This server does not listen on UDP.
 }
 
 TEST_CASE("remote clients need the token", "[panel_http]") {
@@ -378,11 +378,11 @@ TEST_CASE("a port in use is an error, and streams end with the panel", "[panel_h
   const int viewer = stage->connect();
   Stage::send(viewer, stage->get("/motion?hz=1"));
   Stage::receive(viewer, 300);
-  const int idler = stage->connect();  // says nothing
+  const int idler = stage->connect();  // Sends nothing.
   Stage::send(idler, "GET / HT");
   auto ended = std::async(std::launch::async, [&] { stage.reset(); });
   CHECK(ended.wait_for(std::chrono::seconds(60)) == std::future_status::ready);
-  CHECK(Stage::receive(viewer).size() < 1 << 22);  // to its end
+  CHECK(Stage::receive(viewer).size() < 1 << 22);  // Until the stream ends.
   close(viewer);
   close(idler);
 }

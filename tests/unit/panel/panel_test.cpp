@@ -1,5 +1,5 @@
-// The panel without a browser: what it draws against what is rendered. Who is let in:
-// panel_http_test.cpp; what a browser does with it: tests/panel.
+// The panel without a browser: its drawing against the render. panel_http_test.cpp tests access,
+// tests/panel the page in a browser.
 #include "app/panel/panel.h"
 
 #include <arpa/inet.h>
@@ -32,12 +32,12 @@ namespace {
 using namespace support;
 using namespace std::chrono_literals;
 
-// --- what is drawn ------------------------------------------------------------------------------
+// --- drawing -------------------------------------------------------------------------------------
 
 struct Scene {
   const char* name;
   std::string text;
-  std::vector<std::string> heard;  // masses, output 1 on
+  std::vector<std::string> heard;  // Masses, in order of outputs from 1.
 };
 
 std::vector<Scene> scenes_with_taps() {
@@ -47,7 +47,7 @@ std::vector<Scene> scenes_with_taps() {
     }
     return scene;
   };
-  // Masses of two kinds, so that modes are scaled by their roots; and one that starts away from 0.
+  // Unequal masses, whose roots scale the modes, and one that does not start at 0.
   const std::string uneven =
       "@g ground 0.\n@a mass 1. 0. 0.\n@b mass 3. 0.2 0.2\n@c mass 2. 0. 0.\n@h ground 0.\n"
       "@k1 springDamper @g @a 0.05 0.001\n@k2 springDamper @a @b 0.1 0.001\n"
@@ -103,7 +103,7 @@ TEST_CASE("the drawing matches the render for every kernel", "[panel]") {
             most = std::max(most, std::fabs(player.out[i].back()));
             CHECK(std::fabs(shown - player.out[i].back()) < 1e-6);
           }
-          CHECK(most > 1e-3);  // it moves: 0 = 0 would prove nothing
+          CHECK(most > 1e-3);  // It must move for the comparison to mean anything.
         }
       }
     }
@@ -127,9 +127,9 @@ TEST_CASE("a large network is drawn in part", "[panel]") {
   CHECK(frame.count == picture.masses.size());
 }
 
-// A blow as soft as half a period of 80 Hz, on a string whose waves nothing damps: what is drawn
-// between its places is where places would be that hold nothing. A sample to either side is what a
-// place's own rounding is worth, and a straight line has a thirty-second of the string.
+// A soft strike of half a period of 80 Hz on a lossless string: the drawing between its places
+// equals the motion of places that hold nothing. The tolerance is a sample to either side, the
+// rounding of a place; linear interpolation would be off by a thirty-second of the string.
 TEST_CASE("a waveguide's drawing matches its displacement", "[panel]") {
   for (const std::string kind : {"waveguide", "openWaveguide"}) {
     const std::string text = "@s " + kind + " 1. 55. 1000. 1. 0.1\n@out1 posOutput [@s 0.23]\n" +
@@ -165,7 +165,7 @@ TEST_CASE("a waveguide's drawing matches its displacement", "[panel]") {
     heard.run(300, blow(heard));
     double most = 0.0;
     double apart = 0.0;
-    double straight = 0.0;  // as far as a string is off that is drawn at its places alone
+    double straight = 0.0;  // Error of a string drawn at its places only.
     for (int time = 0; time < 40; ++time) {
       drawn.run(97);
       heard.run(97);
@@ -237,7 +237,7 @@ TEST_CASE("viewing changes no bit of the sound and allocates nothing", "[panel]"
     CHECK(plain.out == watched.out);
     CHECK(peak(plain.y()) > 1e-3);
     CHECK(watched.heap_calls == 0);
-    // The newest frame brings the sound as it was played.
+    // The newest frame contains the played sound.
     watched.process.wants_motion.raise();
     watched.run(static_cast<std::size_t>(2.0 * Process::longest_strobe_s * rate), 64);
     watched.process.motion.take();
@@ -290,7 +290,7 @@ TEST_CASE("slow motion is stroboscopic at the sounding pitch", "[panel]") {
     CHECK(frames > 30);
     CHECK(at_their_moment >= 9 * frames / 10);
   }
-  // Where nothing has a pitch it shows what there is, at once.
+  // Without a pitch it shows the current state immediately.
   Harness silent(false, 1);
   delete silent.process.slot.offer(constant("0.5"));
   silent.process.wants_slow_motion.raise();

@@ -1,4 +1,4 @@
-// Against CalculiX, other people's finite elements, on solids that nobody has seen before.
+// Compares random solids with CalculiX, an independent finite element program.
 #include <unistd.h>
 
 #include <cmath>
@@ -47,7 +47,7 @@ TetrahedronMesh random_solid(Random& random, bool is_fine) {
                             : 1 + static_cast<int>(random.below(axis == 0 ? 8 : 3));
     }
     mesh = box_mesh({1.0, 1.0, 1.0}, cells);
-    if (kind == 1 && cells[0] > 2 && cells[1] > 2) {  // a hole through the middle
+    if (kind == 1 && cells[0] > 2 && cells[1] > 2) {  // A hole through the middle.
       std::vector<Tetrahedron> kept;
       for (const Tetrahedron& t : mesh.tetrahedra) {
         Point3 middle{};
@@ -86,7 +86,7 @@ std::vector<double> calculix(const SolidMesh& mesh, const SolidMaterial& materia
   std::filesystem::create_directories(folder);
   {
     std::ofstream deck(folder / "solid.inp");
-    deck.precision(12);  // it reads twenty characters of a number
+    deck.precision(12);  // CalculiX reads twenty characters per number.
     deck << "*NODE,NSET=ALL\n";
     for (std::size_t i = 0; i < mesh.points.size(); ++i) {
       const Point3& p = mesh.points[i];
@@ -127,8 +127,8 @@ std::vector<double> calculix(const SolidMesh& mesh, const SolidMaterial& materia
   return frequencies;
 }
 
-// CalculiX sums the mass of a C3D10 at four points, which is exact for polynomials of the second
-// degree and not for these of the fourth.
+// CalculiX integrates the mass of a C3D10 at four points, which is exact for degree two but not for
+// these polynomials of degree four.
 void take_mass_of_four_points(const SolidMesh& mesh, double density, SolidMatrices& matrices) {
   constexpr std::size_t edges[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
   matrices.mass.value.assign(matrices.mass.value.size(), 0.0);
@@ -150,7 +150,7 @@ void take_mass_of_four_points(const SolidMesh& mesh, double density, SolidMatric
       }
       for (std::size_t a = 0; a < 10; ++a) {
         for (std::size_t b = 0; b < 10; ++b) {
-          if (element[a] >= element[b]) {  // nothing is clamped: rows are nodes
+          if (element[a] >= element[b]) {  // Nothing is clamped: rows are nodes.
             matrices.mass.value[matrices.mass.find(element[a], element[b])] +=
                 0.25 * density * volume * n[a] * n[b];
           }
@@ -172,7 +172,7 @@ Case random_case(int seed, bool is_fine) {
           {"", random.uniform(1e9, 3e11), random.uniform(0.05, 0.42), random.uniform(500.0, 1e4)}};
 }
 
-// With CalculiX's own mass: to the digits that it prints.
+// With CalculiX's own mass matrix: to the printed digits.
 double worst_with_its_mass(int seed) {
   const auto [mesh, material] = random_case(seed, false);
   SolidMatrices matrices = solid_matrices(mesh, material, {}, Progress());
@@ -194,7 +194,7 @@ double worst_with_its_mass(int seed) {
   return worst;
 }
 
-// As they come, on a mesh that is fine enough for the rule for the mass to make no difference.
+// With the exact mass, on a mesh fine enough for the integration rule not to matter.
 double worst_as_they_come(int seed) {
   const auto [mesh, material] = random_case(seed, true);
   const auto modes = find_solid_modes(mesh, material, {}, modes_compared, Progress());

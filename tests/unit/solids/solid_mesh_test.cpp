@@ -24,7 +24,7 @@ double volume_of(const SolidMesh& solid) {
 TEST_CASE("meshes of boxes and balls are complete and closed", "[solid_mesh]") {
   const auto box = quadratic(box_mesh({3.0, 2.0, 1.0}, {3, 2, 2}));
   REQUIRE(box);
-  CHECK(box->points.size() == 7 * 5 * 5);  // twice as many along each side, less one
+  CHECK(box->points.size() == 7 * 5 * 5);  // Twice as many along each side, less one.
   CHECK(box->elements.size() == 72);
   CHECK(volume_of(*box) == Approx(6.0).epsilon(1e-12));
   const auto closed = close_surface({.points = box->points, .triangles = box->surface}, Progress());
@@ -37,7 +37,7 @@ TEST_CASE("meshes of boxes and balls are complete and closed", "[solid_mesh]") {
   REQUIRE(ball);
   const double round = 4.0 / 3.0 * std::numbers::pi * 8.0;
   CHECK(volume_of(*ball) < round);
-  CHECK(volume_of(*ball) == Approx(round).epsilon(0.04));  // its edges are straight
+  CHECK(volume_of(*ball) == Approx(round).epsilon(0.04));  // Its edges are straight.
   for (const Triangle& triangle : ball->surface) {
     for (const int corner : triangle) {
       CHECK(length(ball->points[static_cast<std::size_t>(corner)]) == Approx(2.0).epsilon(1e-12));
@@ -49,7 +49,7 @@ TEST_CASE("a box is recognised in any orientation, and nothing else is", "[solid
   Random random(5);
   for (int round = 0; round < 20; ++round) {
     Surface box = box_surface({random.uniform(0.1, 2.0), random.uniform(0.1, 2.0), 1.0});
-    // Turned by two angles and moved.
+    // Rotated by two angles and moved.
     const double a = random.uniform(0.0, 6.0);
     const double b = random.uniform(0.0, 6.0);
     for (Point3& p : box.points) {
@@ -73,7 +73,7 @@ TEST_CASE("a box is recognised in any orientation, and nothing else is", "[solid
       }
       CHECK(distance < 1e-9);
     }
-    // With one corner moved it is none.
+    // With one corner moved it is no box.
     box.points[random.below(8)][random.below(3)] += 0.05;
     closed = close_surface(box, Progress());
     REQUIRE(closed);
@@ -111,7 +111,8 @@ TEST_CASE("a ball is recognised anywhere, and nothing else is", "[solid_mesh]") 
   const auto mesh = quadratic(lying_ball_mesh(*found, 10000.0));
   REQUIRE(mesh);
   CHECK(mesh->unknowns() < 10000);
-  // One point moved; what is cut off; a long one; a box, whose corners lie on a sphere, too.
+  // One point moved; a truncated ball; an elongated one; and a box, whose corners also lie on a
+  // sphere.
   ball.points[7] = ball.points[7] + Point3{0.01, 0.0, 0.0};
   closed = close_surface(ball, Progress());
   REQUIRE(closed);
@@ -131,7 +132,7 @@ TEST_CASE("flat, missing and absent tetrahedra are reported", "[solid_mesh]") {
   CHECK_FALSE(quadratic({}));
   CHECK_FALSE(quadratic({{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}}, {{0, 1, 2, 3}}}));
   CHECK_FALSE(quadratic({{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2, 3}}}));
-  // One that is turned inside out is turned back; a point that belongs to none is left out.
+  // An inverted tetrahedron is flipped; an unused point is left out.
   const auto turned =
       quadratic({{{5, 5, 5}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{1, 3, 2, 4}}});
   REQUIRE(turned);
@@ -153,7 +154,7 @@ TEST_CASE("files of meshing programs are read, and faulty ones reported", "[soli
   const auto same = read_tetgen(nodes, elements);
   REQUIRE(same);
   CHECK(same->tetrahedra == mesh->tetrahedra);
-  // However it is cut off or changed, there is an answer.
+  // Truncated or corrupted files give a result or an error.
   Random random(9);
   for (int round = 0; round < 2000; ++round) {
     std::string broken = gmsh;

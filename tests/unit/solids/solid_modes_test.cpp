@@ -26,7 +26,7 @@ SolidModes modes_of(const TetrahedronMesh& mesh, const SolidMaterial& material, 
                     const std::vector<SolidClamp>& clamps = {}) {
   const auto modes = find_solid_modes(meshed(mesh), material, clamps, count, Progress());
   REQUIRE(modes);
-  // Of all that is found here: shapes of mass 1, orthogonal, and solutions.
+  // Holds for all results here: mass-normalised, orthogonal shapes that solve the equations.
   CHECK(modes->skewness < 1e-9);
   CHECK(modes->residual < 1e-6);
   CHECK(std::is_sorted(modes->frequency_hz.begin(), modes->frequency_hz.end()));
@@ -41,15 +41,15 @@ double nearest(const SolidModes& modes, double frequency_hz) {
   return best;
 }
 
-// The free modes of a box by Ritz's method with products of Legendre polynomials up to a degree in
-// all: none of the code that is tested. Hz, ascending, the six motions as a whole left out.
+// The free modes of a box by Ritz's method with products of Legendre polynomials up to a total
+// degree, independent of the tested code. Hz, ascending, the six rigid motions left out.
 std::vector<double> ritz_box(const Point3& sides, const SolidMaterial& material, int degree) {
-  // On -1..1, P_n of length 1: int P_i P_j is the unit matrix; these are int P_i' P_j, int P_i'
+  // On -1..1 with P_n of unit norm, int P_i P_j is the identity; these are int P_i' P_j, int P_i'
   // P_j'.
   const auto n = static_cast<std::size_t>(degree + 1);
   std::vector<std::vector<double>> slope(n, std::vector<double>(n));
   std::vector<std::vector<double>> bend(n, std::vector<double>(n));
-  constexpr int steps = 64;  // Gauss-Legendre by Newton on P_64
+  constexpr int steps = 64;  // Gauss-Legendre nodes by Newton's method on P_64.
   for (int s = 0; s < steps; ++s) {
     double x = std::cos(pi * (s + 0.75) / (steps + 0.5));
     double derivative = 1.0;
@@ -137,9 +137,9 @@ TEST_CASE("a steel bar has the frequencies of Ritz's method", "[solid_modes]") {
   CHECK(modes.mass == Approx(0.314).epsilon(1e-12));
   for (const double hz : {1285.95, 2506.99, 3490.57, 6529.94, 6696.96, 12612.99}) {
     CHECK(nearest(modes, hz) == Approx(hz).epsilon(1e-3));
-    CHECK(nearest(modes, hz) > hz * (1.0 - 1e-5));  // finite elements come from above
+    CHECK(nearest(modes, hz) > hz * (1.0 - 1e-5));  // Finite elements converge from above.
   }
-  CHECK(nearest(modes, 5800.8) == Approx(5800.8).epsilon(1e-2));  // torsion
+  CHECK(nearest(modes, 5800.8) == Approx(5800.8).epsilon(1e-2));  // Torsion.
 }
 
 TEST_CASE("a cube has double and triple modes", "[solid_modes]") {
@@ -156,7 +156,7 @@ TEST_CASE("a cube has double and triple modes", "[solid_modes]") {
 }
 
 TEST_CASE("a ball has Lamb's frequencies", "[solid_modes]") {
-  // eta = omega R sqrt(rho / G) at nu = 0.3; our own ball, drawn to the volume of a round one.
+  // eta = omega R sqrt(rho / G) at nu = 0.3; the meshed ball is scaled to the volume of a sphere.
   TetrahedronMesh ball = ball_mesh(1.0, 4);
   const SolidMesh solid = meshed(ball);
   double six = 0.0;
@@ -174,7 +174,7 @@ TEST_CASE("a ball has Lamb's frequencies", "[solid_modes]") {
   for (const auto& [eta, count] :
        {std::pair(2.50113, 5), {2.64622, 5}, {3.52999, 3}, {3.86470, 7}, {3.93740, 7}}) {
     for (int i = 0; i < count; ++i) {
-      // Eight cells across; a finer one is held to 0.3 % where files become bodies.
+      // Eight cells across; the body tests require 0.3 % of a finer mesh.
       CHECK(2.0 * pi * modes.frequency_hz[next++] == Approx(eta).epsilon(4e-3));
     }
   }
@@ -200,8 +200,8 @@ TEST_CASE("boxes of any size and material have the frequencies of Ritz's method"
 }
 
 TEST_CASE("a tapered membrane has the frequencies of the NAFEMS benchmark", "[solid_modes]") {
-  // ME-T5, FV32: 10 m long, 5 m high at the root and 1 m at the tip; in its plane alone, which a
-  // stiff spring at every node of the middle plane sees to here.
+  // ME-T5, FV32: 10 m long, 5 m high at the root and 1 m at the tip. Motion is confined to its
+  // plane by a stiff spring at every node of the middle plane.
   TetrahedronMesh mesh = box_mesh({10.0, 1.0, 0.05}, {32, 16, 2});
   std::vector<SolidClamp> root;
   for (Point3& point : mesh.points) {
@@ -230,7 +230,7 @@ TEST_CASE("a tapered membrane has the frequencies of the NAFEMS benchmark", "[so
 
 TEST_CASE("a clamped bar has the frequencies of a cantilever", "[solid_modes]") {
   // f = (beta L)^2 / 2 pi sqrt(E I / rho A) / L^2 with beta L = 1.87510, 4.69409 (Euler-Bernoulli).
-  // At L / h = 100 shear takes less than 0.1 %, and what the clamp hinders adds about as much.
+  // At L / h = 100 shear lowers it by less than 0.1 %, and the clamp raises it by about as much.
   const double l = 1.0;
   const double h = 0.01;
   const SolidMaterial steel{"", 2e11, 0.0, 7850.0};
@@ -240,7 +240,7 @@ TEST_CASE("a clamped bar has the frequencies of a cantilever", "[solid_modes]") 
   const double unit = h / (2.0 * pi * l * l) * std::sqrt(2e11 / 7850.0 / 12.0);
   CHECK(modes.frequency_hz[0] == Approx(1.87510407 * 1.87510407 * unit).epsilon(5e-3));
   CHECK(modes.frequency_hz[2] == Approx(4.69409113 * 4.69409113 * unit).epsilon(5e-3));
-  // Held at one node it turns all ways, and along an edge still one.
+  // Clamped at one node it can rotate about three axes, along an edge about one.
   CHECK(modes_of(box_mesh({0.1, 0.05, 0.05}, {2, 1, 1}), steel, 4, {{{}, 1e-6}}).rigid == 3);
   CHECK(modes_of(box_mesh({0.1, 0.05, 0.05}, {2, 1, 1}), steel, 4,
                  {{{}, 1e-6}, {{0.0, 0.0, 0.025}, 1e-6}, {{0.0, 0.0, 0.05}, 1e-6}})
@@ -250,7 +250,7 @@ TEST_CASE("a clamped bar has the frequencies of a cantilever", "[solid_modes]") 
 }
 
 TEST_CASE("size, stiffness and density scale frequencies exactly", "[solid_modes]") {
-  // ME-T7: f goes with sqrt(E / rho) / L.
+  // ME-T7: f scales with sqrt(E / rho) / L.
   TetrahedronMesh mesh = box_mesh({0.1, 0.06, 0.03}, {4, 3, 2});
   for (Point3& point : mesh.points) {
     point[1] += point[0] * point[0];
@@ -312,7 +312,7 @@ TEST_CASE("all modes of a small solid equal those of its dense matrices", "[soli
       }
     }
   }
-  // K M^-1 has the same eigenvalues; and the mass adds up to that of the solid, in each axis.
+  // K M^-1 has the same eigenvalues, and the mass sums to that of the solid in each axis.
   double total = 0.0;
   for (const double value : m.values) {
     total += value;
@@ -320,7 +320,7 @@ TEST_CASE("all modes of a small solid equal those of its dense matrices", "[soli
   const SolidModes modes = modes_of(mesh, material, static_cast<int>(size) - 6);
   CHECK(total == Approx(3.0 * modes.mass).epsilon(1e-12));
   CHECK(modes.frequency_hz.size() == size - 6);
-  // ME-T6: exactly six motions as a whole.
+  // ME-T6: exactly six rigid motions.
   const auto all = lowest_solid_pairs(solid, matrices, -0.01, 8, Progress());
   REQUIRE(all);
   CHECK(std::abs(all->values[5]) < 1e-9 * all->values[6]);
@@ -339,9 +339,8 @@ TEST_CASE("all modes of a small solid equal those of its dense matrices", "[soli
     const double omega = 2.0 * pi * modes.frequency_hz[i - 6];
     CHECK(omega * omega == Approx(exact[i]).epsilon(1e-9));
   }
-  // Every share of a force goes somewhere: the sum over all modes, the six motions as a whole
-  // among them, is what the mass matrix's inverse has there. Of those six phi'phi is known:
-  // 1/m + |(p - c) x d|^2 / J; here they are what is left.
+  // Completeness: the sum over all modes, rigid motions included, equals the inverse of the mass
+  // matrix. The rigid part is known, 1/m + |(p - c) x d|^2 / J; here it is the remainder.
   for (std::size_t row = 0; row < size; row += 7) {
     double sum = 0.0;
     for (std::size_t i = 0; i + 6 < size; ++i) {
@@ -368,7 +367,7 @@ TEST_CASE("decays follow their formulas", "[solid_modes]") {
   CHECK(rayleigh.t60_s(200.0) == Approx(2.737).epsilon(5e-4));
   CHECK(rayleigh.t60_s(1000.0) == Approx(2.234).epsilon(5e-4));
   CHECK(rayleigh.t60_s(5000.0) == Approx(0.399).epsilon(1e-3));
-  // A loss factor of 2e-4 at 440 Hz: the width is eta f, T60 = ln 1000 / (pi eta f).
+  // A loss factor of 2e-4 at 440 Hz: the bandwidth is eta f, T60 = ln 1000 / (pi eta f).
   CHECK(SolidDamping{.loss = 2e-4}.t60_s(440.0) ==
         Approx(std::log(1000.0) / (pi * 2e-4 * 440.0)).epsilon(1e-12));
 }
@@ -382,8 +381,8 @@ TEST_CASE("fully clamped solids and excessive requests are reported", "[solid_mo
   CHECK(held.error().message.find("clamped") != std::string::npos);
   const auto many = find_solid_modes(solid, steel, {}, 1000, Progress());
   REQUIRE(many);
-  CHECK(many->frequency_hz.size() == 75);  // 27 nodes, less six motions
-  // Nobody waits any more.
+  CHECK(many->frequency_hz.size() == 75);  // 27 nodes, less six rigid motions.
+  // Cancelled.
   CHECK_THROWS_AS(
       find_solid_modes(solid, steel, {}, 3, Progress([](std::string_view) { return false; })),
       Stopped);

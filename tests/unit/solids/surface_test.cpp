@@ -16,7 +16,7 @@ Result<ClosedSurface> closed(const Surface& surface) {
 TEST_CASE("a solid is the same from ASCII, binary and OBJ", "[surface]") {
   const Surface ball = icosphere(2, 0.5, true);
   const auto ascii = read_stl(ascii_stl(ball));
-  const auto binary = read_stl(binary_stl(ball));  // its header begins with "solid"
+  const auto binary = read_stl(binary_stl(ball));  // Its header begins with "solid".
   const auto faces = read_obj(obj(ball));
   REQUIRE(ascii);
   REQUIRE(binary);
@@ -28,7 +28,7 @@ TEST_CASE("a solid is the same from ASCII, binary and OBJ", "[surface]") {
     CHECK(solid->surface.triangles.size() == 320);
     CHECK(solid->shells == 1);
     CHECK(solid->turned == 0);
-    // The sphere's own volume, to what floats hold.
+    // The sphere's volume, to float precision.
     CHECK(solid->volume == Approx(std::numbers::pi / 6.0).epsilon(1e-6));
   }
 }
@@ -83,7 +83,7 @@ TEST_CASE("unreadable files are reported with the line", "[surface]") {
 
 TEST_CASE("an open surface names its edges", "[surface]") {
   Surface box = box_surface({1.0, 2.0, 3.0});
-  box.triangles.pop_back();  // of the side x = 1: corners 1, 7, 5
+  box.triangles.pop_back();  // Of the side x = 1: corners 1, 7, 5.
   const auto open = closed(box);
   REQUIRE_FALSE(open);
   const std::string& said = open.error().message;
@@ -93,7 +93,7 @@ TEST_CASE("an open surface names its edges", "[surface]") {
   CHECK(said.find("(1, 0, 3) to (1, 2, 3)") != std::string::npos);
   CHECK(said.find("(1, 0, 0) to (1, 2, 3)") != std::string::npos);
 
-  // Two boxes that share an edge: four triangles there.
+  // Two boxes that share an edge, which has four triangles.
   Surface touching = box_surface({1.0, 1.0, 1.0});
   append(touching, box_surface({1.0, 1.0, 1.0}, {1.0, 1.0, 0.0}));
   const auto crowded = closed(touching);
@@ -126,7 +126,7 @@ TEST_CASE("triangles are oriented outwards, and coincident points are welded", "
   CHECK(solid->volume == Approx(6.0).epsilon(1e-12));
   CHECK(solid->turned == turned);
 
-  auto loose = read_stl(ascii_stl(box));  // three points to each triangle
+  auto loose = read_stl(ascii_stl(box));  // Three points per triangle.
   REQUIRE(loose);
   for (Point3& point : loose->points) {
     point[0] += random.uniform(-1e-7, 1e-7);
@@ -136,7 +136,7 @@ TEST_CASE("triangles are oriented outwards, and coincident points are welded", "
   CHECK(welded->surface.points.size() == 8);
   CHECK(welded->welded == 28);
 
-  // A triangle that is a line adds nothing.
+  // A degenerate triangle adds nothing.
   Surface sliver = box_surface({1.0, 1.0, 1.0});
   sliver.triangles.push_back({0, 1, 1});
   const auto thinned = closed(sliver);
@@ -146,7 +146,7 @@ TEST_CASE("triangles are oriented outwards, and coincident points are welded", "
 
 TEST_CASE("cavities face inwards, and two bodies are rejected", "[surface]") {
   Surface shell = icosphere(2, 1.0, true);
-  append(shell, icosphere(2, 0.5, true));  // both outwards, the inner one last
+  append(shell, icosphere(2, 0.5, true));  // Both face outwards, the inner one comes last.
   const auto hollow = closed(shell);
   REQUIRE(hollow);
   CHECK(hollow->shells == 2);
@@ -166,7 +166,7 @@ TEST_CASE("cavities face inwards, and two bodies are rejected", "[surface]") {
   REQUIRE_FALSE(two);
   CHECK(two.error().message.find("more than one part") != std::string::npos);
 
-  // A ball within the hollow hangs on nothing.
+  // A loose ball inside the cavity.
   append(shell, icosphere(1, 0.2, true));
   const auto rattle = closed(shell);
   REQUIRE_FALSE(rattle);
@@ -174,8 +174,8 @@ TEST_CASE("cavities face inwards, and two bodies are rejected", "[surface]") {
 }
 
 TEST_CASE("one-sided surfaces and surfaces without volume are rejected", "[surface]") {
-  // A projective plane: the six points of half an icosahedron, every two joined. Every edge has two
-  // triangles, and no way of turning them fits.
+  // A projective plane: the six points of half an icosahedron, all joined. Every edge has two
+  // triangles, and the surface cannot be oriented.
   Surface plane;
   plane.points = {{0, 0, 1},      {1, 0, 0},       {0.3, 0.9, 0},
                   {-0.8, 0.6, 0}, {-0.8, -0.6, 0}, {0.3, -0.9, 0}};
@@ -242,7 +242,7 @@ TEST_CASE("random bytes do not crash the readers", "[surface]") {
       }
     }
   }
-  CHECK(read > 500);  // so that not all were refused at their first byte
+  CHECK(read > 500);  // Some inputs must be accepted for the test to mean anything.
   CHECK(whole > 200);
 }
 
