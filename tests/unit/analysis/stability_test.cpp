@@ -451,8 +451,8 @@ TEST_CASE("a link on a waveguide is stable unless it is negative", "[stability]"
         "5: may be unstable: the stiffness -K = -0.1 of 'a' is negative, so motion can "
         "grow without end");
   CHECK(complaint_of(held + "@a damper @g [@w 0.3] -1.5\n") ==
-  // A spring elsewhere does not compensate a negative one.
         "5: may be unstable: the damping -1.5 of 'a' is negative, so motion can grow without end");
+  // A spring elsewhere does not compensate a negative one.
   CHECK(
       complaint_of(held + "@a spring @m [@w 0.3] -0.1\n@b spring @m @g 0.5\n") ==
       "5: may be unstable: the stiffness -0.1 of 'a' is negative, so motion can grow without end");
