@@ -13,7 +13,7 @@ namespace ressort::model {
 namespace {
 
 struct Point {
-  std::string label;  // behind NAME_
+  std::string label;  // without the prefix NAME_
   double x = 0.0;
   double y = 0.0;
   bool is_fixed = false;
@@ -38,51 +38,48 @@ std::string in_row(std::uint32_t j, std::uint32_t i) {
   return at("m", j) + "_" + std::to_string(i);
 }
 
-Layout row_of(const Shape& shape) {
-  Layout made;
-  const std::uint32_t n = shape.length;
-  const std::uint32_t held = shape.kind == ShapeKind::chain ? 0 : 1;  // at each end
-  for (std::uint32_t i = 0; i < n; ++i) {
-    const bool is_fixed = held == 1 && (i == 0 || i + 1 == n);
-    const std::string label = is_fixed ? at("s", i == 0 ? 0 : 1) : at("m", i - held);
-    made.points.push_back({label, i / 10.0, 0.0, is_fixed});
+// Returns the macro of the same shape, if there is one.
+std::optional<MacroKind> macro_of(ShapeKind kind) {
+  switch (kind) {
+    case ShapeKind::string:
+      return MacroKind::string;
+    case ShapeKind::stiff_string:
+      return MacroKind::stiff_string;
+    case ShapeKind::chain:
+      return MacroKind::chain;
+    case ShapeKind::mesh:
+      return MacroKind::mesh;
+    case ShapeKind::closed_mesh:
+      return MacroKind::closed_mesh;
+    case ShapeKind::corner_mesh:
+      return MacroKind::corner_mesh;
+    default:
+      return std::nullopt;
   }
-  for (std::uint32_t i = 0; i + 1 < n; ++i) {
-    made.bonds.push_back({i, i + 1});
-  }
-  if (shape.kind == ShapeKind::stiff_string) {
-    for (std::uint32_t i = 0; i + 2 < n; ++i) {
-      made.bonds.push_back({i, i + 2, true});
-    }
-    made.bonds.push_back({0, 1, true});
-    made.bonds.push_back({n - 2, n - 1, true});
-  }
-  return made;
 }
 
-Layout rectangle(const Shape& shape) {
+// The nodes and links of a macro, with labels.
+Layout of_macro(const Shape& shape, MacroKind kind) {
+  Network network;
+  network.macros.push_back({.kind = kind,
+                            .length = shape.length,
+                            .width = is_mesh(kind) ? shape.width : 1,
+                            .stiffness = 0,
+                            .second_stiffness = 1});
+  const Macro& macro = network.macros[0];
   Layout made;
-  const std::uint32_t rows = shape.length;
-  const std::uint32_t columns = shape.width;
-  for (std::uint32_t j = 0; j < rows; ++j) {
-    for (std::uint32_t i = 0; i < columns; ++i) {
-      const bool row_end = j == 0 || j + 1 == rows;
-      const bool column_end = i == 0 || i + 1 == columns;
-      const bool is_fixed = shape.kind == ShapeKind::closed_mesh   ? row_end || column_end
-                            : shape.kind == ShapeKind::corner_mesh ? row_end && column_end
-                                                                   : false;
-      made.points.push_back({in_row(j, i), j / 10.0, i / 10.0, is_fixed});
-    }
+  std::uint32_t moving = 0;
+  for (std::uint32_t k = 0; k < node_count(macro); ++k) {
+    const std::uint32_t row = k / macro.width;
+    const std::uint32_t column = k % macro.width;
+    const bool held = is_fixed(macro, k);
+    const std::string label = is_mesh(kind) ? in_row(row, column)
+                              : held        ? at("s", k == 0 ? 0 : 1)
+                                            : at("m", moving++);
+    made.points.push_back({label, row / 10.0, column / 10.0, held});
   }
-  for (std::uint32_t j = 0; j < rows; ++j) {
-    for (std::uint32_t i = 0; i + 1 < columns; ++i) {
-      made.bonds.push_back({j * columns + i, j * columns + i + 1});
-    }
-  }
-  for (std::uint32_t j = 0; j + 1 < rows; ++j) {
-    for (std::uint32_t i = 0; i < columns; ++i) {
-      made.bonds.push_back({j * columns + i, (j + 1) * columns + i});
-    }
+  for (const Link& link : expand_macros(network).links) {
+    made.bonds.push_back({link.a, link.b, link.arguments[0] == macro.second_stiffness});
   }
   return made;
 }
@@ -119,7 +116,7 @@ Layout triangle(const Shape& shape) {
   return made;
 }
 
-// Ring j has six sides of j points; each side starts at a corner.
+// A hexagon: ring j has six sides of j points, and each side starts at a corner.
 Layout hexagon(const Shape& shape) {
   struct Direction {
     int q, r;
@@ -151,7 +148,7 @@ Layout hexagon(const Shape& shape) {
   for (std::uint32_t j = 2; j <= n; ++j) {
     for (std::uint32_t k = 0; k < 6 * (j - 1); ++k) {
       const std::uint32_t inner = ring(j - 1) + k;
-      const std::uint32_t outer = k + k / (j - 1);  // a side has one point more in each ring
+      const std::uint32_t outer = k + k / (j - 1);  // each ring has one more point on a side
       if (k % (j - 1) == 0) {
         made.bonds.push_back({inner, ring(j) + (outer + 6 * j - 1) % (6 * j)});
       }
@@ -163,38 +160,10 @@ Layout hexagon(const Shape& shape) {
 }
 
 Layout layout_of(const Shape& shape) {
-  switch (shape.kind) {
-    case ShapeKind::string:
-    case ShapeKind::stiff_string:
-    case ShapeKind::chain:
-      return row_of(shape);
-    case ShapeKind::triangle:
-      return triangle(shape);
-    case ShapeKind::hexagon:
-      return hexagon(shape);
-    default:
-      return rectangle(shape);
-  }
-}
-
-// Of the kinds that are macros too.
-std::optional<MacroKind> macro_of(ShapeKind kind) {
-  switch (kind) {
-    case ShapeKind::string:
-      return MacroKind::string;
-    case ShapeKind::stiff_string:
-      return MacroKind::stiff_string;
-    case ShapeKind::chain:
-      return MacroKind::chain;
-    case ShapeKind::mesh:
-      return MacroKind::mesh;
-    case ShapeKind::closed_mesh:
-      return MacroKind::closed_mesh;
-    case ShapeKind::corner_mesh:
-      return MacroKind::corner_mesh;
-    default:
-      return std::nullopt;
-  }
+  const auto macro = macro_of(shape.kind);
+  return macro                               ? of_macro(shape, *macro)
+         : shape.kind == ShapeKind::triangle ? triangle(shape)
+                                             : hexagon(shape);
 }
 
 bool has_width(ShapeKind kind) {
@@ -206,7 +175,7 @@ bool is_plane(ShapeKind kind) {
   return has_width(kind) || kind == ShapeKind::triangle || kind == ShapeKind::hexagon;
 }
 
-// Where a model is pushed and heard, in shares of its length and width: off every symmetry.
+// Coordinates of the input and the output, 0 to 1. They avoid all axes of symmetry.
 struct Spot {
   double u, v;
 };
@@ -312,7 +281,7 @@ class Builder {
     network_.links.push_back(std::move(link));
   }
 
-  // What nothing holds would fly away from the first push.
+  // Adds a ground: without one, the first push would move the whole shape away.
   void hold(std::uint32_t mass) {
     network_.masses.push_back(
         {.name = label("s0"), .kind = MassKind::ground, .position = shape_.position});
@@ -334,7 +303,7 @@ class Builder {
     return static_cast<std::uint32_t>(network_.masses.size() - 1);
   }
 
-  // The point that moves and is nearest to the spot, `other` left out.
+  // Returns the moving point nearest to the spot, except `other`.
   static std::uint32_t nearest(const Layout& layout, Spot spot, std::uint32_t other) {
     double x[2] = {0.0, 0.0};
     double y[2] = {0.0, 0.0};
@@ -365,7 +334,7 @@ class Builder {
   ArgumentId second_ = no_argument;
   ArgumentId damping_ = no_argument;
   ArgumentId air_ = no_argument;
-  ArgumentId none_ = no_argument;  // the K of an oscillator that has only air around it
+  ArgumentId none_ = no_argument;  // K of an oscillator with air damping only
 };
 
 std::uint64_t point_count(const Shape& shape) {
@@ -393,7 +362,7 @@ std::uint32_t least_size(ShapeKind kind) {
   }
 }
 
-// What is wrong with the shape's size; empty where nothing is.
+// Returns an error message for the shape's size, or "".
 std::string size_problem(const Shape& shape) {
   const bool is_mesh = has_width(shape.kind);
   const std::uint32_t least = least_size(shape.kind);
@@ -412,14 +381,14 @@ std::string size_problem(const Shape& shape) {
                 : ", or " + std::to_string(max_macro_nodes) + " as a macro");
   }
   if (shape.kind == ShapeKind::corner_mesh && point_count(shape) == 4) {
-    return "of four corners has nothing that moves";
+    return "has only corners, which are fixed";
   }
   return "";
 }
 
 std::string number_problem(const Shape& shape) {
   if (!is_identifier(shape.name) || shape.name.size() > 32) {
-    return "a name has letters, digits and '_' only, no digit first, and at most 32 of them";
+    return "a name has at most 32 letters, digits and '_', and does not start with a digit";
   }
   if (!(shape.mass >= 1e-300) || !std::isfinite(shape.mass)) {
     return "a mass must be above 0";
@@ -448,14 +417,14 @@ Result<Network> generate(const Shape& shape) {
       return Error{"there is no macro for triangles and hexagons"};
     }
     if (shape.name == "in1" || shape.name == "out1") {
-      return Error{"the name '" + shape.name + "' is that of a channel"};
+      return Error{"the name '" + shape.name + "' is reserved for a channel"};
     }
     return Builder(shape).macro(*macro);
   }
   const Layout layout = layout_of(shape);
   if (std::all_of(layout.points.begin(), layout.points.end(),
                   [](const Point& point) { return point.is_fixed; })) {
-    return Error{"this shape is so small that nothing in it moves"};
+    return Error{"all points of this shape are fixed: choose a larger size"};
   }
   return Builder(shape).points(layout);
 }

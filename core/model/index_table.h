@@ -1,4 +1,4 @@
-// core/model: a hash table of what there may be millions of.
+// core/model: a compact hash table for millions of elements.
 #pragma once
 
 #include <bit>
@@ -10,7 +10,7 @@
 
 namespace ressort::model {
 
-// Of the elements of somebody else's array it keeps the indices only.
+// A table of indices into an array that the caller owns; open addressing with linear probing.
 class IndexTable {
  public:
   static constexpr std::uint32_t none = 0xffffffffu;
@@ -18,7 +18,7 @@ class IndexTable {
   explicit IndexTable(std::size_t most_indices = 0)
       : places_(std::bit_ceil(most_indices + most_indices / 2 + 1), none) {}
 
-  // The place of the index that is the one looked for, or, holding `none`, where it belongs.
+  // Returns the slot of the matching index, or the free slot for it, which holds `none`.
   template <class IsIt>
   std::uint32_t& find(std::size_t hash, IsIt&& is_it) {
     while (true) {

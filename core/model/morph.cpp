@@ -10,7 +10,8 @@
 namespace ressort::model {
 namespace {
 
-// Calls f(argument, is_place) for every number of the network, in one order for all of a structure.
+// Calls f(argument, is_place) for every number of the network, in an order that depends only on the
+// structure.
 template <class F>
 void each_argument(Network& network, F&& f) {
   for (Mass& mass : network.masses) {
@@ -44,7 +45,7 @@ void each_argument(Network& network, F&& f) {
   }
 }
 
-// What is left of a network without its numbers, names and drawings.
+// Returns the network without its numbers, names and drawings.
 Network structure_of(Network network) {
   each_argument(network, [](ArgumentId& id, bool) { id = no_argument; });
   for (Output& output : network.outputs) {
@@ -85,8 +86,8 @@ std::optional<Error> differs(const Network& base, const MorphStop& stop) {
     return std::nullopt;
   }
   const auto told = [&](const std::string& what, SourceLocation at) {
-    return Error{"a morph goes between presets of one structure, but " + what + " in " + stop.name +
-                     "; put both into one model and turn the levels of its outputs, as "
+    return Error{"a morph needs models of the same structure, but " + what + " in " + stop.name +
+                     "; put both into one model and change the levels of its outputs, as "
                      "SixStructures does",
                  at.line, at.column};
   };
@@ -101,8 +102,7 @@ std::optional<Error> differs(const Network& base, const MorphStop& stop) {
         return std::to_string(macro.length) +
                (macro.width > 1 ? " by " + std::to_string(macro.width) : "");
       };
-      return told(quoted(here.name) + " has " + size(here) + " nodes and not the " + size(there) +
-                      " that it has",
+      return told(quoted(here.name) + " has " + size(here) + " nodes, not " + size(there) + ", as",
                   here.location);
     }
   }
@@ -110,7 +110,7 @@ std::optional<Error> differs(const Network& base, const MorphStop& stop) {
     return here.size() == there.size()
                ? std::nullopt
                : std::optional(told("there are " + std::to_string(here.size()) + " " + what +
-                                        " and not the " + std::to_string(there.size()),
+                                        ", not " + std::to_string(there.size()) + ", as",
                                     {}));
   };
   for (auto wrong :
@@ -126,7 +126,7 @@ std::optional<Error> differs(const Network& base, const MorphStop& stop) {
       return told("a link has another law or other ends than", base.links[i].location);
     }
   }
-  return told("something else is held, driven, heard, or starts elsewhere", {});
+  return told("other elements are fixed, driven or heard, or start elsewhere, than", {});
 }
 
 Formula combined(Formula a, const Formula& b, Op op) {
@@ -204,7 +204,7 @@ class Morphing {
     return false;
   }
 
-  // Where a point is on a body: the number of one of its places. Nothing between two.
+  // Returns the index of the body's place at a point, or nothing between two places.
   static std::optional<std::size_t> place_of(const MorphStop& stop, std::uint32_t tap) {
     const Network& network = *stop.network;
     const std::size_t places = network.macros[network.taps[tap].macro].places.size();
@@ -216,9 +216,10 @@ class Morphing {
                : std::nullopt;
   }
 
-  // What a blow at one place sends to another by a mode is the product of its shapes there. So the
-  // shape where the body is driven stays, the stops' other shapes are multiplied with what theirs
-  // is to that, and each output becomes one of each stop, faded from one to the next.
+  // A mode transfers a blow from one place to another by the product of its shapes at both. So the
+  // shapes at the driven place are the same for all stops, the shapes at the outputs are scaled to
+  // keep each stop's product, and each output is split into one for each stop, which are
+  // crossfaded.
   void morph_shapes(std::uint32_t body) {
     const auto is_on_body = [&](std::uint32_t mass) {
       return out_.masses[mass].kind == MassKind::point &&
@@ -226,10 +227,10 @@ class Morphing {
     };
     const auto refuse = [&](const std::string& why) {
       error_ = {quoted(out_.macros[body].name) +
-                    " cannot be morphed where its modes have other shapes: " + why,
+                    " has modes of different shapes and cannot be morphed: " + why,
                 out_.macros[body].location.line, out_.macros[body].location.column};
     };
-    std::optional<std::uint32_t> driven;  // the point
+    std::optional<std::uint32_t> driven;  // the driven point
     for (const Input& input : out_.inputs) {
       if (is_on_body(input.mass) && (!input.is_force || driven)) {
         return refuse("more than one input drives it");
@@ -257,7 +258,7 @@ class Morphing {
       }
     }
     std::vector<Output> outputs;
-    std::vector<std::pair<std::uint32_t, std::size_t>> taps;  // and their places
+    std::vector<std::pair<std::uint32_t, std::size_t>> taps;  // and the places that they get
     taps.emplace_back(out_.masses[*driven].tap, 0);
     for (const Output& output : out_.outputs) {
       if (!is_on_body(output.mass)) {
@@ -266,7 +267,7 @@ class Morphing {
       }
       const auto there = places_of(out_.masses[output.mass].tap);
       if (!there || !in || output.is_force) {
-        return refuse("it is driven or heard between two of its places");
+        return refuse("it is driven or heard between places");
       }
       for (std::size_t s = 0; s < stops_.size(); ++s) {
         names.push_back("out" + std::to_string(outputs.size() + 1));
@@ -297,7 +298,7 @@ class Morphing {
     return stops_[stop].network->modes[mode].shape[place];
   }
 
-  // [stop] Nothing if it is between two places at one of them.
+  // Returns the place for each stop, or nothing if a stop has the point between two places.
   std::optional<std::vector<std::size_t>> places_of(std::uint32_t tap) const {
     std::vector<std::size_t> places;
     for (const MorphStop& stop : stops_) {
@@ -310,7 +311,7 @@ class Morphing {
     return places;
   }
 
-  // An output on a point of its own that is heard at this stop, and less and less up to the next.
+  // Returns an output on a new point, with the crossfade level of this stop.
   Output faded(const Output& output, std::size_t stop) {
     Output one = output;
     Mass point = out_.masses[output.mass];
@@ -332,7 +333,7 @@ class Morphing {
 
   std::uint32_t position() const { return static_cast<std::uint32_t>(out_.parameters.size() - 1); }
 
-  // With its parameters as numbers, or as those of the morph.
+  // Returns the formula of a stop; its parameters become numbers or parameters of the morph.
   Formula of_stop(std::size_t s, ArgumentId id, double without) {
     if (id == no_argument) {
       return number(without);
@@ -369,7 +370,7 @@ class Morphing {
     return all;
   }
 
-  // How far from one stop to the next: 0..1.
+  // Returns the position between this stop and the one before, 0 to 1.
   Formula share(std::size_t stop) const {
     return {{Op::parameter, position()},
             {Op::number, 0, static_cast<double>(stop)},
@@ -382,7 +383,7 @@ class Morphing {
   ArgumentId add(Formula formula) {
     if (!error_ &&
         (stack_depth(formula) > max_formula_depth || formula.size() > max_formula_steps)) {
-      error_ = Error{"a number of the model is too long a formula to be morphed"};
+      error_ = Error{"a formula of the model is too long for the morph"};
     }
     out_.arguments.push_back(std::move(formula));
     return static_cast<ArgumentId>(out_.arguments.size() - 1);

@@ -1,4 +1,4 @@
-// core/model: one network that goes through several of one structure, as a parameter says.
+// core/model: interpolates between networks of the same structure, by a parameter.
 #pragma once
 
 #include <cstddef>
@@ -11,21 +11,21 @@
 
 namespace ressort::model {
 
-// Where a morph passes.
+// A stop of a morph.
 struct MorphStop {
-  std::string name;            // for people
-  const Network* network;      // of the structure of all others
-  std::vector<double> values;  // [parameter] of its own
+  std::string name;            // for messages
+  const Network* network;      // with the same structure as all others
+  std::vector<double> values;  // [parameter] values
   double gain = 1.0;           // of its outputs
 };
 
-// A network of the structure of `base`, with its names, lines and drawings, that is the first stop
-// where `parameter` is 1, the second where it is 2, and so on. Between two, every number goes by
-// equal ratios: masses, stiffness, damping, times, levels (straight lines of dB); places, and what
-// is not above 0 at both, go in straight lines. Of their parameters those that `knobs` names, and
-// those that audio gives, stay what they are; the others are numbers. The error says how two
-// structures differ, with the line of `base`, or what stands in the way. O(elements * stops)
-// [any thread but audio]
+// Returns a network with the structure, names, lines and drawings of `base`. It equals the first
+// stop at `parameter` = 1, the second at 2, and so on. In between, numbers are interpolated
+// geometrically (masses, stiffness, damping, times; levels linearly in dB); coordinates, and
+// numbers that are not above 0 at both stops, are interpolated linearly. Parameters in `knobs`, and
+// those that audio inputs set, are kept; the others become numbers. The error describes the
+// difference between two structures, with the line of `base`. O(elements * stops) [any thread but
+// audio]
 Result<Network> morphed(const Network& base, std::span<const MorphStop> stops,
                         const std::string& parameter, std::span<const std::string> knobs);
 

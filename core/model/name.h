@@ -1,4 +1,4 @@
-// core/model: a label in 16 bytes. A network has millions of them, most of a few letters.
+// core/model: a string of 16 bytes. A network may have millions of labels, most of them short.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace ressort::model {
 
-// Holds up to 15 bytes itself, more on the heap.
+// Stores up to 15 bytes inline, longer labels on the heap.
 class Name {
  public:
   Name() = default;
@@ -61,7 +61,7 @@ class Name {
     return text;
   }
 
-  std::array<char, most_held + 1> bytes_{};  // the last one is the length, or `elsewhere`
+  std::array<char, most_held + 1> bytes_{};  // the last byte is the length, or `elsewhere`
 };
 
 }  // namespace ressort::model

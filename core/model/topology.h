@@ -1,4 +1,4 @@
-// core/model: the shapes that macros stand for.
+// core/model: expands macros to masses and links.
 #pragma once
 
 #include <span>
@@ -9,24 +9,24 @@
 
 namespace ressort::model {
 
-// Of one model, unless who reads it has the memory for more.
+// Limit for one model, unless the caller has memory for more.
 inline constexpr std::uint64_t max_macro_nodes = 4'000'000;
 
 bool is_waveguide(MacroKind kind);
-bool is_on_waveguide(const Network& network, std::uint32_t mass);  // a place, written out or not
+bool is_on_waveguide(const Network& network, std::uint32_t mass);  // a place, expanded or not
 bool has_waveguide(const Network& network);
-bool is_mesh(MacroKind kind);  // has a length and a width
+bool is_mesh(MacroKind kind);  // with length and width
 
 std::uint64_t node_count(const Macro& macro);
-std::uint64_t link_count(const Macro& macro);  // once it is written out
+std::uint64_t link_count(const Macro& macro);  // after expansion
 
-// [macro] where its masses begin in the network with every macro written out.
+// Returns the index of the first mass of each macro in the expanded network.
 std::vector<std::uint32_t> macro_starts(const Network& network);
 
-bool is_fixed(const Macro& macro, std::uint32_t node);  // by its own number
+bool is_fixed(const Macro& macro, std::uint32_t node);  // numbered within the macro
 
-// The same network with every macro written out as masses and links, which have no names, and its
-// taps told where its nodes are. O(nodes). [any thread but audio]
+// Returns the network with all macros replaced by masses and links without names, and sets the node
+// ranges of the taps. O(nodes). [any thread but audio]
 Network expand_macros(const Network& network, const Progress& progress = {});
 
 }  // namespace ressort::model

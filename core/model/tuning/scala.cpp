@@ -9,14 +9,14 @@ namespace ressort::model {
 namespace {
 
 constexpr std::string_view blanks = " \t\v\f";
-constexpr std::size_t longest_shown = 32;  // of what was found instead
+constexpr std::size_t longest_shown = 32;  // length of quoted text in messages
 
-// The lines that are no comments, one by one.
+// Iterates over the lines that are not comments.
 class ScalaLines {
  public:
   explicit ScalaLines(std::string_view text) : rest_(text) {}
 
-  // Whether there was one more; it is line() from now on.
+  // Advances to the next line; returns false at the end.
   bool next() {
     while (!rest_.empty()) {
       const std::size_t end = std::min(rest_.find('\n'), rest_.size());
@@ -35,7 +35,7 @@ class ScalaLines {
     return false;
   }
 
-  // What stands first in it; what comes behind is for people.
+  // Returns the first word; the rest of a line is a comment.
   std::string_view word() const {
     const std::size_t start = std::min(line_.find_first_not_of(blanks), line_.size());
     const std::string_view rest = line_.substr(start);
@@ -58,7 +58,7 @@ class ScalaLines {
   int number_ = 0;
 };
 
-// The whole of it is a number.
+// Returns the number if the whole text is one.
 template <class Number>
 std::optional<Number> number_of(std::string_view text) {
   Number number{};
@@ -68,7 +68,7 @@ std::optional<Number> number_of(std::string_view text) {
                                                                 : std::nullopt;
 }
 
-// A pitch with a point is cents; without one it is a ratio, or a whole number over 1.
+// Returns the cents of a pitch: with a point it is in cents, without one a ratio or a whole number.
 std::optional<double> cents_of(std::string_view word) {
   constexpr double most_cents = 120'000.0;  // a hundred octaves
   if (word.find('.') != word.npos) {
@@ -153,12 +153,12 @@ Result<KeyboardMap> parse_keyboard_map(std::string_view text) {
                           std::to_string(max_mapped_keys));
   }
   map.octave_steps = *octave;
-  // Those at the end may be left out: they are silent.
+  // Keys missing at the end are silent.
   map.steps.resize(static_cast<std::size_t>(size));
   for (int key = 0; key < size && lines.next(); ++key) {
     const std::string_view word = lines.word();
     if (word.empty()) {
-      continue;  // a last line without anything
+      continue;  // an empty last line
     }
     const auto step = number_of<int>(word);
     const bool is_silent = word == "x" || word == "X";
@@ -206,7 +206,7 @@ Result<std::vector<double>> key_frequencies(const Scale& scale, const KeyboardMa
     constexpr double lowest_hz = 1e-3;
     constexpr double highest_hz = 1e6;
     if (hz != 0.0 && !(hz >= lowest_hz && hz <= highest_hz)) {
-      // Nobody hears it; what a far step of a wide scale gives is no fault.
+      // A distant step of a wide scale may be inaudible; that is not an error.
       frequencies.push_back(0.0);
       continue;
     }

@@ -289,7 +289,7 @@ TEST_CASE("a morph that is not possible is rejected with advice", "[morph]") {
   const std::string plain = string("string 12 1. 0.1 0.001 0. 0.");
   CHECK(
       refused(plain, string("string 20 1. 0.1 0.001 0. 0.")) ==
-      "a morph goes between presets of one structure, but 's' has 12 nodes and not the 20 that it "
+      "a morph needs models of the same structure, but 's' has 12 nodes and not the 20 that it "
       "has in Other; put both into one model and turn the levels of its outputs, as SixStructures "
       "does");
   CHECK(refused(plain, string("chain 12 1. 0.1 0.001 0. 0.")).find("is of another kind") !=

@@ -71,7 +71,7 @@ bool is_plane(ShapeKind kind) {
 
 }  // namespace
 
-TEST_CASE("the shapes have as many points and links as the formulas say", "[generate]") {
+TEST_CASE("shapes have the documented numbers of points and links", "[generate]") {
   for (std::uint32_t n = 3; n <= 12; ++n) {
     const std::uint32_t w = n + 2;
     struct Count {
@@ -116,7 +116,7 @@ TEST_CASE("the shapes have as many points and links as the formulas say", "[gene
   }
 }
 
-TEST_CASE("a triangle's inner points have six neighbours, all as near as drawn", "[generate]") {
+TEST_CASE("inner points of a triangle have six neighbours at equal distances", "[generate]") {
   for (const ShapeKind kind : {ShapeKind::triangle, ShapeKind::hexagon}) {
     const Network network =
         made({.kind = kind, .length = 7, .fixed = FixedPoints::border, .with_io = false});
@@ -142,7 +142,7 @@ TEST_CASE("a triangle's inner points have six neighbours, all as near as drawn",
   }
 }
 
-TEST_CASE("a shape written out is its macro", "[generate]") {
+TEST_CASE("a generated shape equals the expanded macro", "[generate]") {
   for (const ShapeKind kind : all_kinds) {
     if (kind == ShapeKind::triangle || kind == ShapeKind::hexagon) {
       continue;
@@ -196,8 +196,7 @@ TEST_CASE("a shape written out is its macro", "[generate]") {
   }
 }
 
-TEST_CASE("a shape is a model that sounds, is stable and has nothing to complain of",
-          "[generate]") {
+TEST_CASE("a generated shape is audible, stable and free of warnings", "[generate]") {
   for (const ShapeKind kind : all_kinds) {
     for (const bool as_macro : {false, true}) {
       if (as_macro && (kind == ShapeKind::triangle || kind == ShapeKind::hexagon)) {
@@ -238,7 +237,7 @@ TEST_CASE("a shape is a model that sounds, is stable and has nothing to complain
   }
 }
 
-TEST_CASE("labels and numbers are as asked", "[generate]") {
+TEST_CASE("labels and numbers follow the options", "[generate]") {
   CHECK(print_network(made({.kind = ShapeKind::stiff_string,
                             .length = 4,
                             .name = "low",
@@ -267,7 +266,7 @@ TEST_CASE("labels and numbers are as asked", "[generate]") {
         "# Inputs\n@in1 frcInput [@m 0.3 0.4]\n\n# Outputs\n@out1 posOutput [@m 0.8 0.7]\n");
 }
 
-TEST_CASE("what makes no model is refused with a reason", "[generate]") {
+TEST_CASE("invalid shapes are rejected with a reason", "[generate]") {
   struct Wrong {
     Shape shape;
     const char* message;
@@ -280,7 +279,7 @@ TEST_CASE("what makes no model is refused with a reason", "[generate]") {
            Wrong{{.kind = ShapeKind::corner_mesh, .length = 2, .width = 2},
                  "this shape of four corners has nothing that moves"},
            Wrong{{.kind = ShapeKind::triangle, .length = 2},
-                 "this shape is so small that nothing in it moves"},
+                 "all points of this shape are fixed: choose a larger size"},
            Wrong{{.kind = ShapeKind::hexagon}, "this shape needs a size of at least 1"},
            Wrong{{.length = 100'001},
                  "this shape may have at most 100000 points, or 4000000 as a macro"},
@@ -291,9 +290,9 @@ TEST_CASE("what makes no model is refused with a reason", "[generate]") {
            Wrong{{.kind = ShapeKind::hexagon, .length = 3, .as_macro = true},
                  "there is no macro for triangles and hexagons"},
            Wrong{{.length = 5, .name = "in1", .as_macro = true},
-                 "the name 'in1' is that of a channel"},
+                 "the name 'in1' is reserved for a channel"},
            Wrong{{.length = 5, .name = "a b"},
-                 "a name has letters, digits and '_' only, no digit first, and at most 32 of them"},
+                 "a name has at most 32 letters, digits and '_', and does not start with a digit"},
            Wrong{{.length = 5, .mass = 0.0}, "a mass must be above 0"},
            Wrong{{.length = 5, .mass = std::nan("")}, "a mass must be above 0"},
            Wrong{{.length = 5, .stiffness = -1.0}, "a stiffness or damping must not be below 0"},

@@ -50,7 +50,7 @@ std::vector<double> keys_of(const std::string& scale, const std::string& map = "
 
 }  // namespace
 
-TEST_CASE("a scale's steps are ratios, whole numbers and cents", "[scala]") {
+TEST_CASE("steps of a scale are ratios, integers or cents", "[scala]") {
   const auto scale = parse_scale(just);
   REQUIRE(scale);
   REQUIRE(scale->cents.size() == 7);
@@ -63,7 +63,7 @@ TEST_CASE("a scale's steps are ratios, whole numbers and cents", "[scala]") {
   CHECK(parse_scale("\n1\n2"));  // a description may be empty
 }
 
-TEST_CASE("without a map every key is a step from the middle C on", "[scala]") {
+TEST_CASE("without a keyboard map, middle C plays step 0", "[scala]") {
   const auto keys = keys_of(just);
   const double c_hz = 440.0 * std::exp2(-9.0 / 12.0);
   CHECK(keys[60] == Approx(c_hz).epsilon(1e-13));
@@ -74,7 +74,7 @@ TEST_CASE("without a map every key is a step from the middle C on", "[scala]") {
   CHECK(keys[45] == Approx(c_hz / 4.0 * 15.0 / 16.0).epsilon(1e-13));
 }
 
-TEST_CASE("a map says which key plays which step, and at what pitch", "[scala]") {
+TEST_CASE("a keyboard map assigns steps and the reference pitch", "[scala]") {
   // The white keys of a piano play the seven steps, the black ones none; A is 432 Hz.
   const std::string white =
       "! white.kbm\n12\n0\n127\n60\n69\n432.0\n7\n0\nx\n1\nx\n2\n3\nx\n4\nx\n5\nx\n6\n";
@@ -102,7 +102,7 @@ TEST_CASE("a map says which key plays which step, and at what pitch", "[scala]")
   CHECK(none.error().message.find("key 61") != std::string::npos);
 }
 
-TEST_CASE("what is wrong with a tuning is told with its line", "[scala]") {
+TEST_CASE("errors in tunings have a line", "[scala]") {
   CHECK(error_of("").starts_with("1:1: expected a line that describes"));
   CHECK(error_of("x\n").starts_with("2:1: expected how many notes"));
   CHECK(error_of("x\n  y\n").starts_with("2:3: expected how many notes the scale has, 1 to 1024"));
@@ -128,7 +128,7 @@ TEST_CASE("what is wrong with a tuning is told with its line", "[scala]") {
       "6:1: expected that key's frequency, 1 to 20000 Hz, found nothing"));
 }
 
-TEST_CASE("whatever a tuning's text is, it is read or refused", "[scala]") {
+TEST_CASE("random tuning files do not crash the reader", "[scala]") {
   // Good files with a few letters changed, cut or doubled: the rest is for the fuzzer.
   support::Random random(17);
   const std::string map = "12\n0\n127\n60\n69\n432.0\n7\n0\nx\n1\nx\n2\n3\nx\n4\nx\n5\nx\n6\n";
@@ -163,7 +163,7 @@ TEST_CASE("whatever a tuning's text is, it is read or refused", "[scala]") {
   CHECK((good > 1000 && bad > 1000));
 }
 
-TEST_CASE("keys sound at their scale's pitch, to a hundredth of a cent", "[scala]") {
+TEST_CASE("keys sound at the pitch of the scale within 0.01 cent", "[scala]") {
   // One mass on a spring, whose frequency in the scheme is known: 2 - K/M = 2 cos w.
   const std::string one =
       "@m mass 1. 0. 0.\n@g ground 0.\n@r spring @m @g 0.01\n@in1 frcInput @m\n@out1 posOutput "
