@@ -11,7 +11,7 @@
 #include "core/analysis/modes/layout.h"
 #include "core/analysis/modes/modes.h"
 #include "core/compile/instrument.h"
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 #include "core/model/topology.h"
 
 namespace ressort::panel {
@@ -22,6 +22,14 @@ using nlohmann::json;
 constexpr std::size_t most_still = 4000;  // Limit on fixed nodes.
 constexpr std::size_t most_lines = 12'000;
 constexpr std::uint32_t nowhere = 0xffffffffu;
+
+// The kind of a law, as the page's colours know it.
+const char* kind_of(const LawFacts& law) {
+  return law.is_friction      ? "bow"
+         : law.is_spring()    ? "spring"
+         : law.is_one_sided() ? "contact"
+                              : "pluck";
+}
 
 class NetworkTeller {
  public:
@@ -50,7 +58,7 @@ class NetworkTeller {
     }
     json laws = json::array();
     for (const LawFacts& facts : law_table()) {
-      laws.push_back({facts.one, family_name(facts.family)});
+      laws.push_back({facts.one, kind_of(facts)});
     }
     json inputs = json::array();
     for (const Input& input : network_.inputs) {
@@ -178,7 +186,7 @@ class NetworkTeller {
     }
     std::sort(line.begin(), line.end());
     for (std::size_t i = 1; i < line.size(); ++i) {
-      lines.push_back({line[i - 1].second, line[i].second, static_cast<int>(Law::spring)});
+      lines.push_back({line[i - 1].second, line[i].second, static_cast<int>(linear_law)});
     }
   }
 

@@ -13,7 +13,7 @@
 #include "app/session/memory.h"
 #include "app/session/timing.h"
 #include "app/text.h"
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 #include "core/model/topology.h"
 
 namespace ressort::session {

@@ -7,7 +7,7 @@
 
 #include "core/analysis/linear.h"
 #include "core/analysis/places.h"
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 #include "core/linear_algebra/eigen.h"
 #include "core/model/topology.h"
 

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/analysis/places.h"
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 #include "core/linear_algebra/cholesky.h"
 #include "core/linear_algebra/eigen.h"
 
@@ -374,7 +374,7 @@ std::optional<Network> fixed_held(const Network& network) {
 
 bool is_linear(const Network& network) {
   for (const Link& link : network.links) {
-    if (link.law != Law::spring) {
+    if (!is_linear(link.law)) {
       return false;
     }
   }

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "core/analysis/proofs.h"
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 #include "core/model/topology.h"
 
 namespace ressort::analysis {
@@ -37,7 +37,7 @@ Network always_felt(Network network) {
       continue;
     }
     const LinearPart part = linear_part(link);
-    link.law = Law::spring;
+    link.law = linear_law;
     link.arguments.fill(no_argument);
     link.arguments[0] = part.stiffness;
     link.arguments[1] = part.damping;

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 #include "core/model/topology.h"
 
 namespace ressort::compile {
@@ -40,7 +40,7 @@ std::vector<ParallelPair> find_parallel_springs(const Network& network) {
   std::vector<std::uint32_t> latest(network.masses.size(), none);  // [upper end] spring
   for (const std::uint32_t l : order) {
     const Link& link = links[l];
-    if (link.law != Law::spring || link.a == link.b) {
+    if (!is_linear(link.law) || link.a == link.b) {
       continue;
     }
     std::uint32_t& other = latest[std::max(link.a, link.b)];

@@ -1,28 +1,20 @@
 #include "core/compile/schemes.h"
 
 #include <algorithm>
-#include <array>
 
 #include "core/analysis/stability.h"
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 #include "core/model/topology.h"
 
 namespace ressort::compile {
 namespace {
 
-// Returns how the published law may gain energy.
-std::string_view trouble(Family family) {
-  switch (family) {
-    case Family::spring:
-      return "blow up where it is the stiffest";
-    case Family::pluck:
-      return "gain energy as it snaps";
-    case Family::bow:
-      return "grip a sample too late";
-    case Family::contact:
-      return "gain energy at a touch";
-  }
-  return "";
+// What may go wrong as published.
+std::string_view trouble(const LawFacts& law) {
+  return law.is_friction      ? "grip a sample too late"
+         : law.is_spring()    ? "blow up where it is the stiffest"
+         : law.is_one_sided() ? "gain energy at a touch"
+                              : "gain energy as it snaps";
 }
 
 std::string counted(const LawFacts& law, std::size_t count) {
@@ -59,7 +51,8 @@ bool exerts_nothing(const Network& network, const Link& link) {
 Schemes choose_schemes(const Network& network, const Budget& budget, const Progress& progress) {
   Schemes schemes;
   schemes.links.resize(network.links.size());
-  std::array<std::size_t, law_count> counts{};  // [first law of a name] nonlinear links
+  std::vector<std::size_t> counts(
+      law_table().size());  // [law] links that are not linear, by their name
   const Link* first = nullptr;
   progress.spend(network.links.size());
   for (std::size_t i = 0; i < network.links.size(); ++i) {
@@ -74,7 +67,7 @@ Schemes choose_schemes(const Network& network, const Budget& budget, const Progr
       schemes.links[i] = LinkScheme{Scheme::discrete_gradient};
       continue;
     }
-    if (link.law == Law::spring) {
+    if (is_linear(link.law)) {
       continue;
     }
     first = first == nullptr ? &link : first;
@@ -90,7 +83,7 @@ Schemes choose_schemes(const Network& network, const Budget& budget, const Progr
     if (counts[i] > 0 && budget.passive == Passivity::always) {
       schemes.notes.push_back(who + " made passive: as published " +
                               (counts[i] == 1 ? "it could " : "they could ") +
-                              std::string(trouble(law.family)));
+                              std::string(trouble(law)));
     }
     all += counts[i] > 0 ? (all.empty() ? "" : ", ") + who : "";
   }

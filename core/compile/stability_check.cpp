@@ -6,7 +6,7 @@
 #include <set>
 
 #include "core/compile/schemes.h"
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 #include "core/model/language/expression.h"
 #include "core/model/preset/fit.h"
 

@@ -106,7 +106,7 @@ void add_links(const Program& program, const LinkRun& run, Share share, LaneValu
       use(x[a] - x[b], v[a] - v[b]);
     });
   };
-  if (run.law == Law::spring) {
+  if (is_linear(run.law)) {
     each([&](double d, double speed) { add_straight(c[0], c[1], d, speed, energy); });
     return;
   }
@@ -114,7 +114,7 @@ void add_links(const Program& program, const LinkRun& run, Share share, LaneValu
       run.law, [&](std::size_t i) { return c[i]; },
       [&]<class ForceLaw>(const ForceLaw& law) {
         constexpr const LawFacts& facts = ForceLaw::facts;
-        const double k = facts.family == Family::spring ? c[facts.slot(Role::stiffness)] : 0.0;
+        const double k = facts.is_spring() ? c[facts.slot(Role::stiffness)] : 0.0;
         each([&](double d, double speed) {
           if (run.scheme == Scheme::discrete_gradient) {
             add_discrete_gradient(law, d, speed, energy);
@@ -164,7 +164,7 @@ bool rests_at_zero(const Program& program, LaneValues<T> coefficients, const dou
   };
   for (const LinkRun& run : program.link_runs) {
     const auto first = program.ends.begin() + run.first;
-    if (facts_of(run.law).family == Family::spring &&
+    if (facts_of(run.law).is_spring() &&
         std::any_of(first, first + run.count,
                     [&](const Ends& ends) { return is_off(ends.a) || is_off(ends.b); })) {
       return false;

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/kernels/passive/clusters.h"
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 
 namespace ressort::kernels {
 namespace {
@@ -23,7 +23,7 @@ LinkCount links_of(const Program& program) {
       continue;
     }
     const bool only_pulls = facts_of(run.law).contains_spring;
-    (run.law == Law::spring ? count.springs : only_pulls ? count.bent : count.others) += run.count;
+    (is_linear(run.law) ? count.springs : only_pulls ? count.bent : count.others) += run.count;
   }
   return count;
 }

@@ -1,4 +1,4 @@
-// core/laws: friction that rises to 2/9 Z s at |v| = s/3 and falls to 0 at s:
+// core/laws: a bow. Its friction rises to 2/9 Z s at |v| = s/3 and falls to 0 at s:
 //   |v| < s/3:        f = (Z - Z/3) v
 //   s/3 <= |v| < s:   f = sgn(v) (s/3) Z - (Z/3) v
 //   else:             f = 0
@@ -16,7 +16,6 @@ template <class V>
 struct Bow {
   static constexpr LawFacts facts = {
       .name = "bow",
-      .family = Family::bow,
       .one = "bow",
       .many = "bows",
       .count = 2,
@@ -29,21 +28,44 @@ struct Bow {
                   .velocity_count = 3,
                   .velocity_says = "chooses a bow's profile"}}},
       .zone = Zone::slow,
+      .is_friction = true,
       .is_curved = false,
       .is_convex = false,
       .solve_ns = 15.0,
-      .faust =
-          "bow(z, s, d, v) =\n"
-          "  select2(abs(v) < s*r, 0.0, select2(abs(v) < s*r/3.0, slip, stick)*z*r)\n"
-          "with {\n"
-          "  stick = 2.0*v/3.0;\n"
-          "  slip = (s*r*select2(v < 0.0, 1.0, 0.0 - 1.0) - v)/3.0;\n"
-          "};\n",
+      .faust = R"(
+bow(z, s, d, v) =
+  select2(abs(v) < s, 0.0, select2(abs(v) < s/3.0, slip, stick)*z)
+with {
+  stick = 2.0*v/3.0;
+  slip = (s*select2(v < 0.0, 1.0, 0.0 - 1.0) - v)/3.0;
+};
+steady_bow(z, s, now, speed, way) = 0.0, 0.0;
+gradient_bow(z, s, b, step) = bow(z, s, 0.0, v),
+  select2(abs(v) < s, 0.0, select2(abs(v) < s/3.0, (0.0 - z)/6.0, z/3.0))
+with {
+  v = 0.5*step;
+};
+alone_bow(z, s, f, damping, b, speed, way, gamma) =
+  side*select2(give > 0.0, select2(remains, 0.0, held), select2(sticks, slipping, held))
+with {
+  half = 0.5*gamma;
+  side = select2(way < 0.0, 1.0, 0.0 - 1.0);
+  fast = 0.5*side*way;
+  stuck = 1.0 + 2.0*half*z/3.0;
+  held = 2.0*z/3.0*fast/stuck;
+  give = 1.0 - half*z/3.0;
+  slips = (fast - half*s*z/3.0)/give;
+  slipping = select2(fast >= s, z/3.0*(s - slips), 0.0);
+  sticks = fast < s/3.0*stuck;
+  remains =
+    sticks & (select2(fast < s, select2(side*speed < slips, 0.0, 1.0), 1.0) > 0.5);
+};
+)",
   };
 
   Bow(V z, V s) : stick(z - z / 3), slip(z / 3), inner(s / 3), outer(s), top(s / 3 * z) {}
 
-  // As a row of numbers that a kernel keeps, instead of its arguments.
+  // Reads the row that `keep` writes (see LawType in laws.h).
   explicit Bow(const V* kept)
       : stick(kept[0]), slip(kept[1]), inner(kept[2]), outer(kept[3]), top(kept[4]) {}
   void keep(V* row) const {
@@ -72,16 +94,16 @@ struct Bow {
     return {force(V{}, v), select(fast < outer, select(fast < inner, stick, -slip), V{})};
   }
 
-  // The friction f(v) at the speed v that solves v + half f(v) = wanted, in closed form. For
-  // half Z > 3 there may be three such speeds: it goes on to stick, or to slip, as it did at the
-  // speed `last`.
+  // Returns the friction f(v) at the speed v that solves v + half f(v) = wanted, in closed form. For
+  // half Z > 3 there may be three such speeds. The bow then keeps sticking, or slipping, as it did
+  // at the speed `last`.
   V grip(V wanted, V last, V half) const {
     const V side = select(wanted < V{}, V{} - 1, V{} + 1);
     const V fast = side * wanted;
     const V stuck = fast / (1 + half * stick);
     const V give = 1 - half * slip;
     const V slipping = (fast - half * top) / give;
-    const V torn = inner * (1 + half * stick);  // where sticking ends
+    const V torn = inner * (1 + half * stick);  // the bow sticks below this
     const auto sticks = fast < torn;
     const auto is_free = fast >= outer;
     const auto remains = sticks & ((fast < outer) | (side * last < slipping));
@@ -99,7 +121,7 @@ struct Bow {
   V slip;
   V inner;
   V outer;
-  V top;  // where the outer slopes would meet at 0
+  V top;  // force of the extended outer slope at v = 0
 };
 
 }  // namespace RESSORT_ROUNDING

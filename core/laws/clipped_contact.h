@@ -1,5 +1,5 @@
-// core/laws: a contact with a cubic spring that is clipped at k; without the clipped spring's extra
-// damping. With D = d + t, and s instead of k where k < s:
+// core/laws: a contact whose force is that of a clipped spring, without the extra damping. With
+// D = d + t, and s instead of k if k < s:
 //   d > -t: f = s D + c D^3 + Z v up to |D| = sqrt((k - s)/c), then k D + Z v; else 0
 #pragma once
 
@@ -9,7 +9,7 @@ namespace ressort::laws {
 inline namespace RESSORT_ISA {
 inline namespace RESSORT_ROUNDING {
 
-// A clipped spring's potential on one side of 0 only.
+// The potential of a clipped spring for d > 0, and 0 elsewhere.
 template <class V>
 struct ClippedWall {
   V energy(V d) const { return select(d > V{}, inside.energy(d), V{}); }
@@ -22,7 +22,6 @@ template <class V>
 struct ClippedContact {
   static constexpr LawFacts facts = {
       .name = "clipped_contact",
-      .family = Family::contact,
       .one = "contact",
       .many = "contacts",
       .count = 5,
@@ -40,16 +39,29 @@ struct ClippedContact {
                   .velocity_says = "has 'nlContact'"}}},
       .zone = Zone::below,
       .is_odd = false,
-      .solve_ns = 80.0,  // by Newton
-      .faust =
-          "clipped_contact(s, c, k, z, t, d, v) =\n"
-          "  select2(d > 0.0 - t, 0.0, elastic*r*r + z*r*v)\n"
-          "with {\n"
-          "  depth = d + t;\n"
-          "  elastic = select2(k < s, select2(c == 0.0, bent, s*depth), s*depth);\n"
-          "  bent = select2(c > 0.0, k*depth, select2(c*depth*depth <= k - s, k*depth, cubic));\n"
-          "  cubic = s*depth + c*depth*depth*depth;\n"
-          "};\n",
+      .solve_ns = 80.0,  // by Newton's method
+      .faust = R"(
+clipped_contact(s, c, k, z, t, d, v) = select2(d > 0.0 - t, 0.0, elastic + z*v)
+with {
+  depth = d + t;
+  elastic = select2(k < s, select2(c == 0.0, bent, s*depth), s*depth);
+  bent = select2(c > 0.0, k*depth, select2(c*depth*depth <= k - s, k*depth, cubic));
+  cubic = s*depth + c*depth*depth*depth;
+};
+steady_clipped_contact(s, c, k, z, t, now, speed, way) = 0.0,
+  0.5*z*inside(now - speed + t, now + t, now - speed + way + t);
+gradient_clipped_contact(s, c, k, z, t, b) =
+  discrete(wall(clipped_energy(low, bend, high)), wall(clipped_force(low, bend, high)),
+    wall(clipped_slope(low, bend, high)), b + t)
+with {
+  wall(g, d) = select2(d > 0.0, 0.0, g(d));
+  is_bent = (c > 0.0) & (k >= s);
+  straight = select2(k < s, select2(c == 0.0, k, s), s);
+  low = select2(is_bent, straight, s);
+  bend = select2(is_bent, 0.0, c);
+  high = select2(is_bent, straight, k);
+};
+)",
   };
 
   V force(V d, V v) const {
@@ -63,7 +75,7 @@ struct ClippedContact {
   V potential(V d) const { return wall().energy(d + t); }
   V secant(V) const { return k; }
 
-  // The potential's discrete gradient, with a damper as far as it touches.
+  // The discrete gradient of the potential, and a damper for the time of the touch.
   V passive(const LinkState<V>& link) const {
     if (!may_touch(link, t)) {
       return V{};

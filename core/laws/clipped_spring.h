@@ -1,6 +1,6 @@
-// core/laws: a cubic spring whose stiffness s grows no further than k, at |d| = b = sqrt((k -
-// s)/c); beyond b it is damped more. mi.lib's b is sqrt(k - s)/c, where the force jumps; this one
-// is continuous.
+// core/laws: a cubic spring whose secant stiffness grows from s to at most k, which it reaches at
+// |d| = b = sqrt((k - s)/c). Beyond b the damping is larger. mi.lib has b = sqrt(k - s)/c, where the
+// force jumps; here it is continuous.
 //   c = 0:      f = s d + Z v
 //   s >= k:     f = k d + Z v
 //   |d| <= b:   f = s d + c d^3 + Z v
@@ -15,8 +15,8 @@ namespace ressort::laws {
 inline namespace RESSORT_ISA {
 inline namespace RESSORT_ROUNDING {
 
-// s d^2/2 + c d^4/4 up to b, where the force is that of k, then k d^2/2 and as much less as both
-// differ there, (k - s)^2/4c. A plain spring is one with c = 0 and k = s.
+// The potential: s d^2/2 + c d^4/4 up to b, then k d^2/2 - (k - s)^2/4c, which is continuous at b.
+// A plain spring has c = 0 and k = s.
 template <class V>
 struct ClippedPotential {
   ClippedPotential(V s_in, V c_in, V k_in)
@@ -42,9 +42,9 @@ struct ClippedPotential {
   V less;
 };
 
-// How steep s d + c d^3 becomes before it is clipped at k: at b, where c b^2 = k - s, its tangent
-// is s + 3 c b^2 = 3 k - 2 s. As a bound over all arguments it must not fall with any of them but
-// s: that is why s and 3 k - 2 s count wherever c may not be 0.
+// Returns the largest slope of s d + c d^3 before the clip at k. At b, where c b^2 = k - s, the slope
+// is s + 3 c b^2 = 3 k - 2 s. The bound holds for ranges of all arguments, so it must not fall with k
+// or c: if c may differ from 0, it is the larger of s and 3 k - 2 s.
 inline double clipped_stiffness(double least_s, double most_s, bool is_bent, double most_k) {
   return is_bent ? std::max(most_s, 3.0 * most_k - 2.0 * least_s) : most_s;
 }
@@ -53,7 +53,6 @@ template <class V>
 struct ClippedSpring {
   static constexpr LawFacts facts = {
       .name = "clipped_spring",
-      .family = Family::spring,
       .one = "spring that bends",
       .many = "springs that bend",
       .count = 4,
@@ -68,15 +67,37 @@ struct ClippedSpring {
                   .printed = 4,
                   .velocity_count = -1,
                   .velocity_says = "has 'nlSpringDamper'"}}},
-      .solve_ns = 80.0,  // by Newton
-      .faust =
-          "clipped_spring(s, c, k, z, d, v) =\n"
-          "  select2(c == 0.0, select2(s >= k, bent, spring(k, z, d, v)), spring(s, z, d, v))\n"
-          "with {\n"
-          "  bent = select2(c > 0.0, beyond, select2(c*d*d <= k - s, beyond, within));\n"
-          "  within = spring(s, z, d, v) + c*r*r*d*d*d;\n"
-          "  beyond = spring(k, z + 0.3*k*r, d, v);\n"
-          "};\n",
+      .solve_ns = 80.0,  // by Newton's method
+      .faust = R"(
+clipped_spring(s, c, k, z, d, v) =
+  select2(c == 0.0, select2(s >= k, bent, spring(k, z, d, v)), spring(s, z, d, v))
+with {
+  bent = select2(c > 0.0, beyond, select2(c*d*d <= k - s, beyond, within));
+  within = spring(s, z, d, v) + c*d*d*d;
+  beyond = spring(k, z + 0.3*k, d, v);
+};
+steady_clipped_spring(s, c, k, z, now, speed, way) = 0.0,
+  0.5*select2(c == 0.0, select2(s >= k, select2(c > 0.0, beyond, bent), z), z)
+with {
+  beyond = z + 0.3*k;
+  bent = select2(c*now*now <= k - s, beyond, z);
+};
+gradient_clipped_spring(s, c, k, z) = discrete(clipped_energy(low, bend, high),
+  clipped_force(low, bend, high), clipped_slope(low, bend, high))
+with {
+  is_bent = (c > 0.0) & (s < k);
+  low = select2(is_bent, high, s);
+  bend = select2(is_bent, 0.0, c);
+  high = select2(c == 0.0, k, s);
+};
+clipped_energy(s, c, k, d) =
+  select2(c*d*d <= k - s, 0.5*k*d*d - less, d*d*(0.5*s + 0.25*c*d*d))
+with {
+  less = select2(c > 0.0, 0.0, (k - s)*(k - s)/select2(c > 0.0, 1.0, 4.0*c));
+};
+clipped_force(s, c, k, d) = d*select2(c*d*d <= k - s, k, s + c*d*d);
+clipped_slope(s, c, k, d) = select2(c*d*d <= k - s, k, s + 3.0*c*d*d);
+)",
   };
 
   V force(V d, V v) const {
@@ -89,7 +110,7 @@ struct ClippedSpring {
   V potential(V d) const { return elastic().energy(d); }
   V secant(V) const { return k; }
 
-  // The potential's discrete gradient, and the damper of now.
+  // The discrete gradient of the potential, and the damper at the current distance.
   V passive(const LinkState<V>& link) const {
     return damped_force(elastic(), link.before(), link.free, link.gamma, steady(link).damping);
   }
@@ -109,7 +130,7 @@ struct ClippedSpring {
             .stiff_damping = extra,
             .pull = std::max(stiffness, is_bent ? most.k + 2.0 * extra : 0.0)};
   }
-  // From 0 on it may push as long as it pulls further out.
+  // For c <= 0 the smaller of s and k bounds the stiffness; otherwise the outer one, k, does.
   static Slopes gentlest(const ClippedSpring& least) {
     const double far = least.c <= 0.0 ? std::min(least.s, least.k) : least.k;
     return {.damping = std::min(0.0, least.z), .pull = std::min(0.0, far)};

@@ -1,12 +1,11 @@
-// core/laws: a is the lower body, b the upper, t the distance at which they touch:
-//   d > -t: f = K (d + t) + Z v, else 0. It may pull on the way out, as published.
+// core/laws: a contact between the lower body a and the upper body b, which touch at distance t:
+//   d > -t: f = K (d + t) + Z v, else 0
+// The force may attract while the bodies separate, as published.
 #pragma once
 
 #include <algorithm>
-#include <limits>
 
 #include "core/laws/discrete_gradient.h"
-#include "core/laws/straight.h"
 
 namespace ressort::laws {
 inline namespace RESSORT_ISA {
@@ -16,7 +15,6 @@ template <class V>
 struct Contact {
   static constexpr LawFacts facts = {
       .name = "contact",
-      .family = Family::contact,
       .one = "contact",
       .many = "contacts",
       .count = 3,
@@ -41,7 +39,39 @@ struct Contact {
       .is_curved = false,
       .is_straight = true,
       .solve_ns = 35.0,
-      .faust = "contact(k, z, t, d, v) = select2(d > 0.0 - t, 0.0, spring(k, z, d + t, v));\n",
+      .faust = R"(
+contact(k, z, t, d, v) = select2(d > 0.0 - t, 0.0, spring(k, z, d + t, v));
+steady_contact(k, z, t, now, speed, way) = 0.0,
+  0.5*z*inside(now - speed + t, now + t, now - speed + way + t);
+gradient_contact(k, z, t, b, s) = 0.5*k*(p + q)*select2(is_in, x - y, 1.0),
+  0.5*k*select2(is_in, 2.0*x - x*x + y*y, 1.0)
+with {
+  p = max(0.0, b + t + s);
+  q = max(0.0, b + t);
+  is_in = min(p, q) > 0.0;
+  wide = select2(is_in, select2(s == 0.0, s, 1.0), 1.0);
+  x = p/wide;
+  y = q/wide;
+};
+alone_contact(k, z, t, f, damping, b, speed, a, gamma) = elastic + damping*step
+with {
+  u = b + t;
+  h = 0.5*gamma*k;
+  m = 1.0 + gamma*damping;
+  in = (a - 2.0*h*u)/(m + h);
+  bounce = sqrt(a*a + 4.0*m*h*u*u);
+  out = select2(a > 0.0, (a - bounce)/(2.0*m), (0.0 - 2.0)*h*u*u/(a + bounce));
+  past = a + u*m;
+  c = a + 2.0*m*u;
+  hit = sqrt(max(0.0, c*c - 4.0*(m + h)*u*past));
+  p = select2(c < 0.0, (c + hit)/(2.0*(m + h)), (0.0 - 2.0)*u*past/(hit - c));
+  stays = (u > 0.0) & (u + in >= 0.0);
+  step = select2(u > 0.0, select2(past > 0.0, a/m, p - u), select2(stays, out, in));
+  over(square, way) = square/(2.0*select2(way == 0.0, way, 1.0));
+  elastic = select2(u > 0.0, select2(past > 0.0, 0.0, over(k*p*p, p - u)),
+    select2(stays, over((0.0 - k)*u*u, out), k*(u + 0.5*in)));
+};
+)",
   };
 
   V force(V d, V v) const { return select(d > -t, k * (d + t) + z * v, V{}); }
@@ -51,14 +81,10 @@ struct Contact {
   }
   V secant(V) const { return k; }
 
-  StraightPiece<V> piece(V) const requires std::is_floating_point_v<V> {
-    return {-t, std::numeric_limits<V>::infinity(), k, z, k * t};
-  }
-
-  // P = K/2 max(0, d + t)^2, with a damper as far as it touches. With u = before + t, s = after -
-  // before, a = free - before, h = gamma K/2 and m = 1 + gamma Z/2 every case is at most a
-  // quadratic, solved without any cancellation:
-  //   in and in:   (m + h) s = a - 2 h u
+  // The discrete gradient of P = K/2 max(0, d + t)^2, and a damper for the time of the touch. With
+  // u = before + t, s = after - before, a = free - before, h = gamma K/2 and m = 1 + gamma Z/2,
+  // each case is at most a quadratic equation. The formulas avoid cancellation:
+  //   inside:      (m + h) s = a - 2 h u
   //   leaving:     m s^2 - a s - h u^2 = 0, s < 0
   //   entering:    (m + h) p^2 - (a + 2 m u) p + u (a + m u) = 0, p = u + s > 0
   V passive(const LinkState<V>& link) const {
@@ -82,7 +108,7 @@ struct Contact {
     const auto stays = was_in & (u + in >= V{});
     const auto enters = past > V{};
     const V step = select(was_in, select(stays, in, out), select(enters, p - u, a / m));
-    // What is too small to be squared goes no way at all.
+    // A step whose square underflows counts as no step.
     const auto over = [](V square, V way) {
       return square / (2 * select(way == V{}, V{} + 1, way));
     };
@@ -93,8 +119,8 @@ struct Contact {
   Steady<V> steady(const LinkState<V>& link) const {
     return {V{}, may_touch(link, t) ? z / 2 * share_inside(link, t) : V{}};
   }
-  // With what is inside after and before, p and b, and their shares of the way, x and y, that is
-  // K/2 (p + b)(x - y); both inside, x - y = 1.
+  // K/2 (p + b)(x - y), with the depths p and b after and before the step, and their shares x and y
+  // of the step. If both depths are positive, x - y = 1.
   Slope<V> gradient(V before, V step) const {
     const V u = before + t;
     const V p = select(u + step > V{}, u + step, V{});
@@ -108,7 +134,7 @@ struct Contact {
             k / 2 * select(is_in, one, 2 * x - x * x + y * y)};
   }
 
-  // The same as long as it stays inside, and what it adds for every unit of the way.
+  // Returns the force while the bodies touch throughout, and its slope per unit of the step.
   Slope<V> inside(V before) const { return {k * (before + t), (k + z) / 2}; }
 
   static Slopes steepest(const Contact&, const Contact& most, double) {

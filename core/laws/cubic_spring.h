@@ -1,4 +1,4 @@
-// core/laws: f = K d + Q d^3 + Z v
+// core/laws: a cubic spring, f = K d + Q d^3 + Z v
 #pragma once
 
 #include "core/laws/spring.h"
@@ -11,7 +11,6 @@ template <class V>
 struct CubicSpring {
   static constexpr LawFacts facts = {
       .name = "cubic_spring",
-      .family = Family::spring,
       .one = "spring that bends",
       .many = "springs that bend",
       .count = 3,
@@ -25,7 +24,15 @@ struct CubicSpring {
                   .printed = 3}}},
       .contains_spring = true,
       .solve_ns = 30.0,
-      .faust = "cubic_spring(k, q, z, d, v) = spring(k, z, d, v) + q*r*r*d*d*d;\n",
+      .faust = R"(
+cubic_spring(k, q, z, d, v) = spring(k, z, d, v) + q*d*d*d;
+steady_cubic_spring(k, q, z, now, speed, way) = 0.0, 0.5*z;
+gradient_cubic_spring(k, q, z, b, s) = k*(b + 0.5*s) + 0.25*q*(a + b)*(a*a + b*b),
+  0.5*k + 0.25*q*(3.0*a*a + 2.0*a*b + b*b)
+with {
+  a = b + s;
+};
+)",
   };
 
   V force(V d, V v) const { return k * d + q * d * d * d + z * v; }
@@ -35,13 +42,13 @@ struct CubicSpring {
   }
   V secant(V d) const { return k + q * d * d; }
 
-  // Of what is curved; the rest holds what a spring does.
+  // The potential of Q d^3 alone.
   V curved(V d) const { return Scalar<V>(0.25) * q * d * d * d * d; }
 
-  // f = K now + Z (now - before) + the discrete gradient of Q/4 d^4, which without any cancellation
-  // is Q/4 (after + before) (after^2 + before^2). By Newton from where Q now^2 (after + before)/2
-  // in its place would lead; as that function of `after` bends once, where it is b^3 2/3 steep, he
-  // oversteps no more than once.
+  // f = K now + Z (now - before) + the discrete gradient of Q/4 d^4, which is
+  // Q/4 (after + before) (after^2 + before^2), free of cancellation. Newton's method starts at the
+  // solution with the approximation Q now^2 (after + before)/2. The function has one inflection
+  // point, so the iteration overshoots at most once.
   V passive(const LinkState<V>& link) const {
     const Steady<V> linear = steady(link);
     const V b = link.before();

@@ -1,17 +1,18 @@
-// core/laws: laws that cannot gain energy, by discrete gradients. Each finds its force from where
-// the link was, where it is and where it would be without it, and depends on nothing else:
+// core/laws: tools for the passive forms of laws, which cannot create energy. A passive force depends
+// on the distance one sample ago (before), now, and at the next sample without the link (free):
 //
-//   f such that after = free - gamma f,  gamma = w_a + w_b, the inverse masses of what moves
+//   after = free - gamma f,  gamma = w_a + w_b, the inverse masses of the moving ends
 //
-// A potential P gives f = (P(after) - P(before))/(after - before), its discrete gradient: then
-// 1/2 v^2/gamma + (P(now) + P(after))/2 is kept from sample to sample, whatever the stiffness
+// The force of a potential P is its discrete gradient, f = (P(after) - P(before))/(after - before).
+// Then 1/2 v^2/gamma + (P(now) + P(after))/2 is conserved from sample to sample at any stiffness
 // (Gonzalez 1996; Chatziioannou and van Walstijn, J. Sound Vib. 339, 2015; Bilbao, Torin and
-// Chatziioannou, Acta Acustica 101, 2015). Dampers and friction act on (after - before)/2.
+// Chatziioannou, Acta Acustica 101, 2015). Dampers and friction act on the mean velocity
+// (after - before)/2.
 //
-// Laws and their tools are compiled for every instruction set in a namespace of its own,
-// RESSORT_ISA (elsewhere a namespace of that very name): what is built for a wide machine is never
-// linked into what runs on a narrow one. Within it is RESSORT_ROUNDING, in the same way: `exact`
-// where a kernel is built without fused multiply-adds, and is not linked with laws that have them.
+// Laws and their tools are compiled once for each instruction set, in the inline namespace
+// RESSORT_ISA, so that the linker never merges code for a wide processor into code for a narrow one.
+// The inner namespace RESSORT_ROUNDING does the same for `exact` kernels, which are built without
+// fused multiply-adds.
 #pragma once
 
 #include "core/lanes.h"
@@ -21,14 +22,14 @@ namespace ressort::laws {
 inline namespace RESSORT_ISA {
 inline namespace RESSORT_ROUNDING {
 
-// A link in one sample: distances x_a - x_b, and how they change per sample.
+// The state of a link in one sample: distances x_a - x_b and velocities per sample.
 template <class V>
 struct LinkState {
-  V now;    // at the sample's beginning
-  V speed;  // ...and how fast it was: a sample earlier it was at now - speed
-  V free;   // at its end, as it would be without this link
-  V fast;   // ...and how fast; not from positions, which may be far away
-  V gamma;  // how far it gives way, by its two ends, to a force of 1
+  V now;    // distance at the start of the sample
+  V speed;  // velocity there: the distance one sample earlier is now - speed
+  V free;   // distance at the end of the sample without this link
+  V fast;   // velocity there; not computed from positions, which may be large
+  V gamma;  // compliance: the change of distance by a force of 1 on both ends
 
   V before() const { return now - speed; }
 };
@@ -40,15 +41,15 @@ struct Slope {
   V slope;
 };
 
-// What a link exerts wherever it will be, and what it adds for every unit that it goes in two
-// samples: what does not depend on the solution.
+// The part of a passive force that does not depend on the solution: a constant force, and a damping
+// per unit of the change of distance in two samples.
 template <class V>
 struct Steady {
   V force;
   V damping;
 };
 
-// Four roundings.
+// Relative size of four rounding errors.
 template <class V>
 static constexpr Scalar<V> tiny_share() {
   return sizeof(Scalar<V>) == 4 ? Scalar<V>(0x1p-22) : Scalar<V>(0x1p-51);
@@ -56,9 +57,10 @@ static constexpr Scalar<V> tiny_share() {
 
 inline constexpr int most_newton_steps = 48;
 
-// The f = g(after) that solves after + gamma g(after) = free between `far` and `free`: Newton, and
-// by halves where that would step too far or g falls too steeply. Lanes that have arrived stay, so
-// that no lane depends on another.
+// Returns the f = g(after) that solves after + gamma g(after) = free between `far` and `free`.
+// Safeguarded Newton's method: a step that would leave the bracket, or where g falls too steeply, is
+// replaced by bisection. Lanes that have converged do not change any more, so that the result of a
+// lane does not depend on the others.
 template <class V, class Force>
 static inline V force_between(V far, V start, V free, V gamma, Force&& g) {
   constexpr Scalar<V> tiny = tiny_share<V>();
@@ -85,14 +87,15 @@ static inline V force_between(V far, V start, V free, V gamma, Force&& g) {
   return here.value - here.slope * over / (one + gamma * here.slope);
 }
 
-// The same for a g that rises: it is nowhere between more than at `free`.
+// Does the same for a g that never falls, whose largest value in the bracket is g(free).
 template <class V, class Force>
 static inline V rising_force(V free, V gamma, Force&& g) {
   return force_between(free - gamma * g(free).value, free, free, gamma, g);
 }
 
-// (P(after) - P(before))/step, after being before + step, and its slope; near before, where the
-// difference would be noise, the force in the middle; so too where squares vanish.
+// Returns (P(after) - P(before))/step for after = before + step, and its slope. For short steps,
+// where the difference would be rounding noise, and where squares underflow, it returns the force at
+// the midpoint instead.
 template <class V, class Potential>
 static inline Slope<V> discrete_gradient(const Potential& potential, V before, V step) {
   using T = Scalar<V>;
@@ -108,7 +111,7 @@ static inline Slope<V> discrete_gradient(const Potential& potential, V before, V
           select(is_near, potential.slope(middle) / 2, (potential.force(after) - quotient) / wide)};
 }
 
-// g of a potential and a damper, which adds `damping` for every unit of the way.
+// Returns the passive force of a potential and a damper, whose force is `damping` times the step.
 template <class V, class Potential>
 static inline V damped_force(const Potential& potential, V before, V free, V gamma, V damping) {
   return rising_force(free, gamma, [&](V after) {
@@ -117,7 +120,7 @@ static inline V damped_force(const Potential& potential, V before, V free, V gam
   });
 }
 
-// How much of the way from one depth to another is inside.
+// Returns the share of the path between two depths that lies inside, where the depth is positive.
 template <class V>
 static inline V share_inside(V from, V to) {
   const V inside = select(to > V{}, to, V{}) - select(from > V{}, from, V{});
@@ -126,29 +129,29 @@ static inline V share_inside(V from, V to) {
   return select(moves, inside / select(moves, to - from, V{} + 1), still);
 }
 
-// Of the two samples that a centred damper acts over. As it sets in and ends at full speed, it
-// makes a difference whether it does so between two samples or with one.
+// Returns that share for the two samples that a centred damper acts over. A contact begins and ends
+// at full speed, so a damper that switched on at whole samples would be too strong or too weak.
 template <class V>
 static inline V share_inside(const LinkState<V>& m, V t) {
   const V depth = m.now + t;
   return (share_inside(m.before() + t, depth) + share_inside(depth, m.free + t)) / 2;
 }
 
-// Whether it may touch in any lane; where not, it exerts nothing.
+// Returns true if the link may touch in any lane. Otherwise its force is 0.
 template <class V>
 static inline bool may_touch(const LinkState<V>& m, V t) {
   return any_of((m.before() > -t) | (m.now > -t) | (m.free > -t));
 }
 
-// Of a bow or what is like it, by its `grip(wanted, last, half)`: the friction f(v) at the speed v
-// that solves v + half f(v) = wanted, if it was at the speed `last`. Whichever of several speeds
-// that is, friction only takes.
+// Returns the passive force of a friction law. Its `grip(wanted, last, half)` is the friction f(v) at
+// the speed v that solves v + half f(v) = wanted after the speed `last`. Friction dissipates energy
+// at each of several solutions.
 template <class V, class Friction>
 static inline V rubbed(const Friction& bow, const LinkState<V>& link) {
   return bow.grip((link.speed + link.fast) / 2, link.speed, link.gamma / 2);
 }
 
-// The friction after so long a way in two samples, and how much more there is of it for every unit.
+// Returns the friction for a change of distance `step` in two samples, and its slope.
 template <class V, class Friction>
 static inline Slope<V> rubbing(const Friction& bow, V step) {
   const Slope<V> friction = bow.friction(step / 2);

@@ -1,4 +1,5 @@
-// core/laws: a bow whose profile may be turned while it sounds: smooth while that is above 0.
+// core/laws: a bow whose profile can change while it sounds: smooth for a profile above 0,
+// piecewise linear otherwise.
 #pragma once
 
 #include "core/laws/bow.h"
@@ -12,7 +13,6 @@ template <class V>
 struct EitherBow {
   static constexpr LawFacts facts = {
       .name = "either_bow",
-      .family = Family::bow,
       .one = "bow",
       .many = "bows",
       .count = 3,
@@ -22,11 +22,21 @@ struct EitherBow {
                   .most = 3,
                   .arguments = "@A @B Z SCALE [PROFILE]",
                   .printed = 3}}},
+      .is_friction = true,
       .is_convex = false,
-      .solve_ns = 90.0,  // both
-      .faust =
-          "either_bow(z, s, p, d, v) = select2(p > 0.0, bow(z, s, d, v), "
-          "smooth_bow(z, s, d, v));\n",
+      .solve_ns = 90.0,  // both profiles
+      .faust = R"(
+either_bow(z, s, p, d, v) = select2(p > 0.0, bow(z, s, d, v), smooth_bow(z, s, d, v));
+steady_either_bow(z, s, p, now, speed, way) = 0.0, 0.0;
+gradient_either_bow(z, s, p, b, step) =
+  gradient_bow(z, s, b, step), gradient_smooth_bow(z, s, b, step) : chosen
+with {
+  chosen(v1, s1, v2, s2) = select2(p > 0.0, v1, v2), select2(p > 0.0, s1, s2);
+};
+alone_either_bow(z, s, p, f, damping, b, speed, way, gamma) = select2(p > 0.0,
+  alone_bow(z, s, f, damping, b, speed, way, gamma),
+  alone_smooth_bow(z, s, f, damping, b, speed, way, gamma));
+)",
   };
 
   V force(V d, V v) const {
@@ -50,7 +60,7 @@ struct EitherBow {
     return select(profile > V{}, SmoothBow<V>{z, s}.grip(wanted, last, half), piecewise);
   }
 
-  // The smooth one is the steeper.
+  // The smooth profile has the larger slope.
   static Slopes steepest(const EitherBow&, const EitherBow& most, double) {
     return {.damping = smooth_bow_stick * most.z};
   }

@@ -1,11 +1,12 @@
-// core/laws: what is known about a force law, as plain facts. Every law is one file here, and one
-// line in laws.h; all other rooms ask these facts, and none has a list of laws of its own.
+// core/laws: the facts about each force law. Every law is one file in this folder and one row in
+// laws.h. All other rooms read these facts; only the loops of the kernels need the laws' templates.
 //
-// For a link from a to b: d = x_a - x_b, and v = the same difference of the velocities, both in
-// position units and position units per sample. A law gives f; the step applies F_a -= f and
-// F_b += f, so a positive f for a positive d attracts.
+// A link connects a to b. Its distance is d = x_a - x_b, in position units; v = v_a - v_b is its
+// velocity, in position units per sample. A law computes a force f from both, and the step applies
+// F_a -= f and F_b += f. So f > 0 at d > 0 attracts.
 //
-// The laws are those of mi.lib since 2020 (Leonard, Villeneuve, Michon), in their current form.
+// The laws are those of mi.lib since 2020 (Leonard, Villeneuve, Michon), in their current form,
+// and the contact of Hunt and Crossley (1975).
 #pragma once
 
 #include <array>
@@ -18,16 +19,21 @@
 
 namespace ressort::laws {
 
-enum class Law : std::uint8_t;  // its list is in laws.h; the first is the spring
+enum class Law : std::uint8_t;  // laws.h has the list
 
-// How a number follows the sample rate and a voice's pitch. With r = 44100 / rate and s the
-// voice's stiffness factor, a coefficient is its formula's value times r^a s^b.
+inline constexpr Law linear_law{0};  // the spring, the only law whose force is linear
+constexpr bool is_linear(Law law) {
+  return law == linear_law;
+}
+
+// Scaling of a coefficient with the sample rate and a voice's pitch. With r = 44100 / rate and the
+// voice's stiffness factor s, the coefficient is the value of its formula times r^a s^b.
 enum class Unit : std::uint8_t {
   plain,              // distances and thresholds: a = 0, b = 0
   stiffness,          // K: a = 2, b = 1
-  damping,            // Z: a = 1, b = 0, so that a decay stays what it is at every pitch
-  friction,           // Z of a bow: a = 1, b = 1/2, as the string's impedance
-  speed,              // a bow's velocity scale: a = 1, b = 1/2
+  damping,            // Z: a = 1, b = 0, so that the decay time is the same at every pitch
+  friction,           // Z of a bow: a = 1, b = 1/2, like the string's impedance
+  speed,              // velocity scale of a bow: a = 1, b = 1/2
   inverse_mass,       // 1/M: a = 0, b = 0
   inverse_impedance,  // 1/R of a waveguide: a = -1, b = -1/2
   frequency,          // in Hz: a = 0, b = 1/2
@@ -35,48 +41,46 @@ enum class Unit : std::uint8_t {
   gravity_per_rate,   // the same, divided by 44100
 };
 
-// What an argument does. Where all but `reach` and `shape` are 0, the law exerts nothing.
+// Meaning of an argument. A law whose arguments are all 0, except `reach` and `shape`, exerts no
+// force.
 enum class Role : std::uint8_t {
-  stiffness,  // force by distance, where the law begins to act
-  bend,       // how its force grows beyond that, by a power of the distance
-  limit,      // the stiffness that it grows to at most
-  damping,    // force by velocity
-  reach,      // the distance or the speed that it acts over
-  shape,      // which curve it follows
+  stiffness,  // force per distance where the law begins to act
+  bend,       // growth of the force beyond that, by a power of the distance
+  limit,      // the largest stiffness
+  damping,    // force per velocity
+  reach,      // distance or speed at which the law begins or ends to act
+  shape,      // exponent or profile of the curve
 };
 
 struct LawArgument {
   Role role = Role::shape;
   Unit unit = Unit::plain;
-  double least = -1.0;  // of a shape: between these all its curves are
+  double least = -1.0;  // range of a shape that contains all its different curves
   double most = 1.0;
 };
 
 inline constexpr std::size_t most_law_arguments = 5;
 inline constexpr std::size_t most_law_words = 4;
+inline constexpr std::size_t most_kept_numbers = 6;  // see LawType in laws.h
 
 using LawNumbers = std::array<double, most_law_arguments>;  // values of a law's arguments
 
-// A keyword of the .mdl language for a law; it may leave out the first or the last arguments.
+// A keyword of the .mdl language for a law. It may omit the first or the last arguments.
 struct LawWord {
   std::string_view word;
-  int least = 0;  // arguments
+  int least = 0;  // fewest and most arguments
   int most = 0;
-  std::string_view arguments;  // as a person writes them
-  int first = 0;               // which of the law's arguments the word's first is
-  int printed = 0;             // printed if the link has no others than so many; 0: never printed
-  std::string_view tail;       // printed after the arguments
-  // The dialect whose third state argument is a velocity, MIMS4Max, alone writes so many; -1: any
-  // number of them; 0: none.
+  std::string_view arguments;  // for messages
+  int first = 0;               // index of the law's argument that comes first in the line
+  int printed = 0;        // number of arguments up to which the printer uses this word; 0: never
+  std::string_view tail;  // printed after the arguments
+  // Number of arguments that only MIMS4Max writes, the dialect whose third state argument is a
+  // velocity. -1: any number; 0: none.
   int velocity_count = 0;
-  std::string_view velocity_says;  // what a line with so many does
+  std::string_view velocity_says;  // describes such a line in messages
 };
 
-// What a musician calls it.
-enum class Family : std::uint8_t { spring, pluck, bow, contact };
-std::string_view family_name(Family family);
-
-// Where the force is not 0 by itself, `reach` being the argument of that role.
+// The region where the force may differ from 0; `reach` is the argument of that role.
 enum class Zone : std::uint8_t {
   everywhere,
   near,   // |d| < reach
@@ -85,26 +89,41 @@ enum class Zone : std::uint8_t {
 };
 
 struct LawFacts {
-  std::string_view name;  // as in FAUST
-  Family family = Family::spring;
-  std::string_view one;  // in messages
+  std::string_view name;  // in FAUST
+  std::string_view one;   // in messages
   std::string_view many;
-  std::size_t count = 0;  // of the arguments
+  std::size_t count = 0;  // of arguments
   std::array<LawArgument, most_law_arguments> arguments{};
-  std::array<LawWord, most_law_words> words{};  // the first is that of examples; the rest empty
+  std::array<LawWord, most_law_words> words{};  // examples use the first; unused ones are empty
   Zone zone = Zone::everywhere;
-  bool is_odd = true;  // f(-d, -v) = -f(d, v), so that the ends may be exchanged
-  // f = K d + Z v + what is curved, wherever the ends are. Of such a law that part is found as
-  // published even where the rest is found by its discrete gradient: what is always felt is the
-  // matter of the stability proof, and the pitch of small vibrations stays what it was.
+  bool is_friction = false;  // depends on v alone, like a bow, and has no potential
+  bool is_odd = true;        // f(-d, -v) = -f(d, v), so the ends may be exchanged
+  // f = K d + Z v + a curved rest, at every distance. The passive form of such a law keeps K d + Z
+  // v as published and replaces only the rest by its discrete gradient: the proof of stability
+  // covers the linear part, and small vibrations keep their pitch.
   bool contains_spring = false;
-  bool is_curved = true;     // in d; else it is made of straight pieces
-  bool is_straight = false;  // a spring and a damper wherever it acts: `inside` has what it exerts
-  bool is_convex = true;     // its force never falls; not a hill's, nor friction that slips
-  double solve_ns = 0.0;     // measured: one discrete gradient takes so long
-  std::string_view faust;    // its definition
+  bool is_curved = true;  // in d; false if the force is piecewise linear
+  bool is_straight =
+      false;              // a spring and a damper wherever it acts; the law has a function `inside`
+  bool is_convex = true;  // the force never falls with d or v
+  double solve_ns = 0.0;  // measured time to solve one discrete gradient
+  // FAUST definitions, one after the other. The arguments come first, as coefficients at the sample
+  // rate of the program. The quantities are those of discrete_gradient.h.
+  //   NAME(arguments, d, v) = the published force
+  //   steady_NAME(arguments, now, speed, way) = force, damping
+  //     the part of the passive force that does not depend on the solution, and the damping per
+  //     unit of the way; `way` is the change of distance in two samples without the link
+  //   gradient_NAME(arguments, before, step) = force, slope
+  //     the discrete gradient after `step`; of a friction law, the friction
+  //   alone_NAME(arguments, force, damping, before, speed, way, gamma) = force
+  //     optional: the solution in closed form. Without it, Newton's method finds the solution,
+  //     which needs a gradient that does not fall.
+  // The passive form is for links that hold waveguides. There it covers the linear part of a law that
+  // contains a spring, too. The definitions may call `discrete`, `between`, `inside` and `risen`
+  // (core/model/faust/faust_words.cpp) and the definitions of other laws.
+  std::string_view faust;
 
-  // Which argument has a role: the first, or `count` if none has.
+  // Returns the index of the first argument with this role, or `count`.
   constexpr std::size_t slot(Role role) const {
     std::size_t i = 0;
     while (i < count && arguments[i].role != role) {
@@ -113,13 +132,17 @@ struct LawFacts {
     return i;
   }
   constexpr bool has(Role role) const { return slot(role) < count; }
-  // An argument that makes a force; without all of these there is none.
+  // Returns true if the argument makes a force. Without any of these there is none.
   constexpr bool is_strength(std::size_t i) const {
     return i < count && arguments[i].role != Role::reach && arguments[i].role != Role::shape;
   }
-  // Comes and goes with the distance: between far ends there is nothing.
+  // Returns true if the law has a stiffness and acts at every distance.
+  constexpr bool is_spring() const { return zone == Zone::everywhere && !is_friction; }
+  // Returns true if distant ends do not feel each other.
   constexpr bool lets_go() const { return zone == Zone::near || zone == Zone::below; }
-  // How far d is from where the law begins to act; not positive where it acts.
+  // Returns true for a contact: it acts while b is below a.
+  constexpr bool is_one_sided() const { return zone == Zone::below; }
+  // Returns the distance from d to where the law begins to act; not positive where it acts.
   constexpr double gap(const LawNumbers& values, double d) const {
     return zone == Zone::below  ? -values[slot(Role::reach)] - d
            : zone == Zone::near ? (d < 0.0 ? -d : d) - values[slot(Role::reach)]
@@ -127,25 +150,28 @@ struct LawFacts {
   }
 };
 
-// How steep a law is; each the greatest, but not all at one place.
+// The largest slopes of a law's force; not all of them occur at the same place.
 struct Slopes {
   double stiffness = 0.0;      // |dF/dd|
-  double damping = 0.0;        // dF/dv that scales as the law's damping does
-  double stiff_damping = 0.0;  // dF/dv that scales as a stiffness
-  double pull = 0.0;           // dF/dd + 2 stiff_damping at one place: what stability weighs
+  double damping = 0.0;        // dF/dv that scales like the law's damping
+  double stiff_damping = 0.0;  // dF/dv that scales like a stiffness
+  double pull = 0.0;           // dF/dd + 2 stiff_damping at one place; the stability proof needs it
 };
 
-// [Law]
+// The facts of all laws, by Law.
 std::span<const LawFacts> law_table();
 
 const LawFacts& facts_of(Law law);
 
-// For any arguments from `least` to `most`. Of what grows without bound, the slope up to |d| =
-// `within`; 0 is at rest.
+// Returns the law of this name, which must exist.
+Law law_named(std::string_view name);
+
+// Returns the largest slopes for any arguments from `least` to `most`. Where the slope grows
+// without bound, `within` limits |d|; 0 means at rest.
 Slopes steepest(Law law, const LawNumbers& least, const LawNumbers& most, double within);
 
-// The stiffness (pull) and the damping that a link surely has wherever its ends are. Not above 0
-// where it may let go.
+// Returns the stiffness (pull) and damping that a link has at least, wherever its ends are. Not
+// above 0 for a law that may let go.
 Slopes gentlest(Law law, const LawNumbers& least);
 
 }  // namespace ressort::laws

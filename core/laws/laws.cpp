@@ -15,26 +15,32 @@ auto with_numbers(const LawNumbers& numbers) {
   return law_of<Type, double>([&](std::size_t i) { return numbers[i]; });
 }
 
-// Not below 0; what is no number stays so.
+// Returns at least 0; NaN stays NaN.
 double rising(double slope) {
   return std::max(slope, 0.0);
 }
 
-}  // namespace
-
-std::string_view family_name(Family family) {
-  switch (family) {
-    case Family::spring:
-      return "spring";
-    case Family::pluck:
-      return "pluck";
-    case Family::bow:
-      return "bow";
-    case Family::contact:
-      return "contact";
+// Returns true if a line of the FAUST text begins the definition of `prefix` followed by `name`.
+constexpr bool defines(std::string_view text, std::string_view prefix, std::string_view name) {
+  for (std::size_t at = 0; at != text.npos; at = text.find('\n', at)) {
+    at += at < text.size() && text[at] == '\n' ? 1 : 0;
+    const std::string_view line = text.substr(at);
+    if (line.starts_with(prefix) && line.substr(prefix.size()).starts_with(name) &&
+        line.substr(prefix.size() + name.size()).starts_with("(")) {
+      return true;
+    }
   }
-  return "link";
+  return false;
 }
+constexpr bool is_complete(const LawFacts& law) {
+  return defines(law.faust, "", law.name) && defines(law.faust, "steady_", law.name) &&
+         defines(law.faust, "gradient_", law.name);
+}
+static_assert(std::all_of(table.begin(), table.end(), is_complete),
+              "the FAUST text of every law NAME defines NAME, steady_NAME and gradient_NAME");
+static_assert(std::tuple_element_t<0, Laws>::law == linear_law);
+
+}  // namespace
 
 std::span<const LawFacts> law_table() {
   return table;
@@ -42,6 +48,12 @@ std::span<const LawFacts> law_table() {
 
 const LawFacts& facts_of(Law law) {
   return table[static_cast<std::size_t>(law)];
+}
+
+Law law_named(std::string_view name) {
+  const auto found = std::find_if(table.begin(), table.end(),
+                                  [&](const LawFacts& law) { return law.name == name; });
+  return static_cast<Law>(found - table.begin());
 }
 
 Slopes steepest(Law law, const LawNumbers& least, const LawNumbers& most, double within) {

@@ -1,5 +1,6 @@
-// core/laws: every force law, once. To add one: its file beside this one, a name in the enum, and
-// its line in Laws. The property test in tests/unit/laws finds what does not hold together.
+// core/laws: the list of force laws, with their templates. To add a law: write its file beside this
+// one, add its name to the enum, and its row to Laws. The property tests in tests/unit/laws report
+// facts that contradict each other. Include law.h instead where the facts are enough.
 #pragma once
 
 #include <tuple>
@@ -33,17 +34,20 @@ enum class Law : std::uint8_t {
   power_contact,
 };
 
-// A law as a type: With<V> is the law of a link whose arguments are Vs; of it
-//   V force(d, v)
-//   V potential(d)                        its slope is force(d, 0)
-//   V secant(d)                           a stiffness: force over distance, near d
-//   V passive(LinkState)                  the force that cannot gain energy, if it acts alone
-//   Steady<V> steady(LinkState)           of that what does not depend on where it will be,
-//   Slope<V> gradient(before, step)       and the rest, if it goes so far in two samples
-//   V curved(d)                           if it contains a spring: the potential of the rest
-//   Slopes steepest(least, most, within), gentlest(least)  as in law.h, of laws of doubles
-// and where a kernel had better keep other numbers than the arguments, void keep(row) and a
-// constructor that reads the row, of most_kept_numbers at most.
+// A law as a type. With<V> is the law of a link whose arguments are of type V, a number or a pack.
+// It has these members:
+//   V force(d, v)                    the published force
+//   V potential(d)                   its slope is force(d, 0)
+//   V secant(d)                      force over distance near d, a stiffness
+//   V passive(LinkState)             the passive force of a link that acts alone
+//   Steady<V> steady(LinkState)      the part of it that does not depend on the solution
+//   Slope<V> gradient(before, step)  the rest, for a change of distance `step` in two samples
+//   V curved(d)                      the potential of the rest, if the law contains a spring
+//   Slope<V> friction(v)             only of friction laws: the force and its slope
+//   Slope<V> inside(before)          only if is_straight: force and slope while it acts
+//   static Slopes steepest(least, most, within), gentlest(least)  see law.h; for doubles only
+// A law may also have void keep(row) and a constructor from such a row of at most
+// most_kept_numbers: numbers that follow from the arguments and are cheaper to compute with.
 template <Law law_value, template <class> class Struct>
 struct LawType {
   static constexpr Law law = law_value;
@@ -63,10 +67,10 @@ using Laws = std::tuple<LawType<Law::spring, laws::Spring>,                     
                         LawType<Law::contact, laws::Contact>,                   //
                         LawType<Law::clipped_contact, laws::ClippedContact>,    //
                         LawType<Law::power_contact, laws::PowerContact>>;
-inline constexpr std::size_t most_kept_numbers = 6;
 inline constexpr std::size_t law_count = std::tuple_size_v<Laws>;
 
-// Calls `use` with the law's LawType: outside of every loop, which then has the law as a constant.
+// Calls `use` with the law's LawType. Callers do this outside of their loops, so that the law is a
+// constant within them.
 template <std::size_t i = 0, class Use>
 [[gnu::always_inline]] static inline decltype(auto) with_law_type(Law law, Use&& use) {
   using Type = std::tuple_element_t<i, Laws>;
@@ -79,7 +83,7 @@ template <std::size_t i = 0, class Use>
   return use(Type{});
 }
 
-// The law of a type whose arguments are c(0), c(1) and so on.
+// Returns the law whose arguments are c(0), c(1) and so on.
 template <class Type, class V, class Coefficient>
 [[gnu::always_inline]] static inline auto law_of(Coefficient&& c) {
   return [&]<std::size_t... i>(std::index_sequence<i...>) {
@@ -88,7 +92,7 @@ template <class Type, class V, class Coefficient>
   (std::make_index_sequence<Type::facts.count>{});
 }
 
-// Calls `use` with the law of these arguments.
+// Calls `use` with the law that has these arguments.
 template <class V, class Coefficient, class Use>
 [[gnu::always_inline]] static inline decltype(auto) with_law(Law law, Coefficient&& c, Use&& use) {
   return with_law_type(law, [&](auto type) { return use(law_of<decltype(type), V>(c)); });

@@ -1,5 +1,5 @@
-// core/laws: a repulsive triangle: slope 0.9 K up to |d| = s/10, then falling with K/10 to 0 at
-// |d| = s:
+// core/laws: a plectrum that repels the string. The force grows with slope 0.9 K up to |d| = s/10,
+// then falls with slope K/10 to 0 at |d| = s:
 //   |d| < s/10:        f = -(K - K/10) d + Z v
 //   s/10 <= |d| < s:   f = -sgn(d) (s/10) K + (K/10) d + Z v
 //   else:              f = 0
@@ -8,7 +8,6 @@
 #include <algorithm>
 
 #include "core/laws/discrete_gradient.h"
-#include "core/laws/straight.h"
 
 namespace ressort::laws {
 inline namespace RESSORT_ISA {
@@ -18,7 +17,6 @@ template <class V>
 struct Pluck {
   static constexpr LawFacts facts = {
       .name = "pluck",
-      .family = Family::pluck,
       .one = "pluck",
       .many = "plucks",
       .count = 3,
@@ -36,19 +34,97 @@ struct Pluck {
       .is_curved = false,
       .is_convex = false,
       .solve_ns = 100.0,
-      .faust =
-          "pluck(k, s, z, d, v) =\n"
-          "  select2(abs(d) < s, 0.0, select2(abs(d) < s/10.0, outer, inner)*k*r*r + z*r*v)\n"
-          "with {\n"
-          "  inner = 0.0 - 0.9*d;\n"
-          "  outer = d/10.0 - s/10.0*select2(d < 0.0, 1.0, 0.0 - 1.0);\n"
-          "};\n",
+      .faust = R"(
+pluck(k, s, z, d, v) =
+  select2(abs(d) < s, 0.0, select2(abs(d) < s/10.0, outer, inner)*k + z*v)
+with {
+  inner = 0.0 - 0.9*d;
+  outer = d/10.0 - s/10.0*select2(d < 0.0, 1.0, 0.0 - 1.0);
+};
+steady_pluck(k, s, z, now, speed, way) = 0.0, select2(abs(now) < s, 0.0, 0.5*z);
+gradient_pluck(k, s, z, d, way) = foot, other_foot, top, other_top : added
+with {
+  side = select2(d + 0.5*way > 0.0, 1.0, 0.0 - 1.0);
+  b = side*d;
+  foot = ramp(b + s);
+  other_foot = ramp(b - s);
+  top = ramp(b + s/10.0);
+  other_top = ramp(b - s/10.0);
+  added(v1, s1, v2, s2, v3, s3, v4, s4) =
+    side*k*(0.1*(v1 - v2) - (v3 - v4)), k*(0.1*(s1 - s2) - (s3 - s4));
+  ramp(x) = 0.5*(after + before)*select2(is_up, share, 1.0),
+    select2(is_up, select2(before > 0.0, square, share - square), 0.5)
+  with {
+    go = side*way;
+    before = max(0.0, x);
+    after = max(0.0, x + go);
+    is_up = min(before, after) > 0.0;
+    share = (after - before)/select2(go == 0.0, go, 1.0);
+    square = 0.5*share*share;
+  };
+};
+alone_pluck(k, s, z, f, damping, before, speed, way, gamma) =
+  select2(way < gamma*force, 1.0, 0.0 - 1.0) : facing
+with {
+  inner = s/10.0;
+  m = 1.0 + gamma*damping;
+  force = select2(abs(before) < s, 0.0,
+    select2(abs(before) < inner, outside, (0.0 - 0.9)*k*before));
+  outside = k/10.0*(before - select2(before < 0.0, s, 0.0 - s));
+  hill(d) = select2(abs(d) < s, 0.0,
+    0.05*k*slope*slope + 0.45*k*max(0.0, inner*inner - d*d))
+  with {
+    slope = s - max(abs(d), inner);
+  };
+  facing(side) = side*before, side*way, hill(before) : climb : *(side) : found;
+  climb(b, free, height) = free/m, select2(b > s, 0.0, 1.0) :
+    piece(0.0 - 1e30, 0.0 - s, 0.0, 0.0, 0.0) :
+    piece(0.0 - s, 0.0 - inner, 0.0, 0.1*k, 0.0 - s) :
+    piece(0.0 - inner, inner, hill(0.0), 0.0 - 0.9*k, 0.0) :
+    piece(inner, s, 0.0, 0.1*k, s) : piece(s, 1e30, 0.0, 0.0, 0.0) : _, !
+  with {
+    piece(from, to, level, bend, middle, old, has) =
+      m + 0.5*gamma*bend, gamma*bend*there - free,
+      gamma*(level + 0.5*bend*there*there - height) : solve
+    with {
+      there = b - middle;
+      solve(square, linear, rest) = square, linear, rest,
+        linear*linear - 4.0*square*select2((b >= from) & (b < to), rest, 0.0) : root;
+      root(square, linear, rest, inside) =
+        square, linear, rest, inside, sqrt(max(0.0, inside)) : first;
+      first(square, linear, rest, inside, root) = inside,
+        select2(linear < 0.0, linear + root, 2.0*square),
+        select2(linear < 0.0, 0.0 - 2.0*rest, root - linear) : divided;
+      divided(inside, bottom, top) =
+        inside, bottom, top/select2(bottom == 0.0, bottom, 1.0) : judged;
+      judged(inside, bottom, go) = go,
+        ((inside >= 0.0) & (bottom != 0.0) & (go >= 0.0) & (b < to) &
+        (b + go <= to + slack) & (b + go >= from - slack)) : chosen
+      with {
+        slack = 3.6e-15*(s + abs(b) + go);
+      };
+      chosen(go, is_here) =
+        select2(is_here & (has < 0.5), old, go), select2(is_here, has, 1.0);
+    };
+  };
+  found(step) = gradient_pluck(k, s, z, before, step) : pulls
+  with {
+    pulls(value, bend) = select2(way == gamma*force, pull, force)
+    with {
+      pull = value + damping*step - (bend + damping)*more;
+      steep = m + gamma*bend;
+      over = m*step - way + gamma*value;
+      more = select2(abs(steep) > 0.001, 0.0, over/steep);
+    };
+  };
+};
+)",
   };
 
   Pluck(V k, V s, V z_in)
       : rise(k - k / 10), fall(k / 10), inner(s / 10), outer(s), top(s / 10 * k), z(z_in) {}
 
-  // As a row of numbers that a kernel keeps, instead of its arguments.
+  // Reads the row that `keep` writes (see LawType in laws.h).
   explicit Pluck(const V* kept)
       : rise(kept[0]), fall(kept[1]), inner(kept[2]), outer(kept[3]), top(kept[4]), z(kept[5]) {}
   void keep(V* row) const {
@@ -74,20 +150,12 @@ struct Pluck {
   }
   V secant(V) const { return fall; }
 
-  StraightPiece<V> piece(V d) const requires std::is_floating_point_v<V> {
-    if (absolute(d) < inner) {
-      return {-inner, inner, -rise, z, V{}};
-    }
-    return d < V{} ? StraightPiece<V>{-outer, -inner, fall, z, top}
-                   : StraightPiece<V>{inner, outer, fall, z, -top};
-  }
-
-  // Where it wants to snap, or where what is fast passes it in a sample, several ways s keep the
-  // energy, m s^2 - free s + gamma (P(before + s) - P(before)) = 0 with m = 1 + gamma Z/2: it goes
-  // the first of them, as a motion would come there that goes on without leaps. The hill being made
-  // of five pieces that are at most squares, that is the first root of five quadratic equations
-  // that lies on its own piece. What is in balance goes nowhere: a string at rest under a finger
-  // that rests on it, on the very top of the hill, stays there however steep that is.
+  // When the string snaps, or passes the plectrum within a sample, several steps s conserve energy:
+  // m s^2 - free s + gamma (P(before + s) - P(before)) = 0 with m = 1 + gamma Z/2. The string takes
+  // the shortest of them, which a continuous motion reaches first. The potential P consists of five
+  // pieces, each at most quadratic, so this is the first root of five quadratic equations that lies
+  // on its own piece. In equilibrium the step is 0: a string at rest at the top of the potential
+  // stays there, however steep the slopes are.
   V passive(const LinkState<V>& link) const {
     const V before = link.before();
     const V ahead = link.free - before;
@@ -107,7 +175,7 @@ struct Pluck {
     const V summit = potential(V{});
     V s = free / m;
     const auto no = V{} != V{};
-    auto is_found = b > outer;  // it never comes there
+    auto is_found = b > outer;  // the string moves away
     const auto try_piece = [&](V from, V to, V level, V bend, V middle) {
       const V there = b - middle;
       const V square = m + link.gamma * bend / 2;
@@ -142,10 +210,9 @@ struct Pluck {
     const V touches = select(absolute(link.now) < outer, V{} + 1, V{});
     return {V{}, z / 2 * touches};
   }
-  // Its force is made of four ramps, as is that at the mirror's other side: f(d) = fall (r(d +
-  // outer)
-  // - r(d - outer)) - K (r(d + inner) - r(d - inner)), r(x) being max(0, x). So is its discrete
-  // gradient, and what is between two corners is exact, however short the step.
+  // Let r(x) = max(0, x). The force is a sum of four ramps: f(d) = fall (r(d + outer) -
+  // r(d - outer)) - K (r(d + inner) - r(d - inner)). Its discrete gradient is the same sum of the
+  // ramps' gradients, which are exact for steps of any length. The step is mirrored to d < 0.
   Slope<V> gradient(V before, V step) const {
     const V side = select(before + step / 2 > V{}, V{} - 1, V{} + 1);
     const V b = side * before;
@@ -159,7 +226,7 @@ struct Pluck {
             fall * (foot.slope - other_foot.slope) - k * (top.slope - other_top.slope)};
   }
 
-  // It pulls beyond its top; a negative one pulls below it.
+  // The slope dF/dd is positive beyond |d| = s/10, or below it for K < 0.
   static Slopes steepest(const Pluck& least, const Pluck& most, double) {
     return {.stiffness = 9.0 * std::max(most.fall, -least.fall),
             .damping = most.z,
@@ -171,11 +238,11 @@ struct Pluck {
   V fall;
   V inner;
   V outer;
-  V top;  // where the outer slopes would meet at 0
+  V top;  // force of the extended outer slope at d = 0
   V z;
 
  private:
-  // The discrete gradient of max(0, x)^2/2, from x on.
+  // Returns the discrete gradient of max(0, x)^2/2 between x and x + step.
   static Slope<V> ramp(V x, V step) {
     const V before = select(x > V{}, x, V{});
     const V after = select(x + step > V{}, x + step, V{});

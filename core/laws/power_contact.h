@@ -1,8 +1,8 @@
-// core/laws: a felt, a rubber or a ball (Hunt and Crossley, J. Appl. Mech. 42, 1975): harder the
-// deeper, and with a damper that sets in with the depth, so that it neither knocks as it touches
-// nor sticks. With D = d + t and an exponent P of 1 or more (below, 1):
+// core/laws: a contact by a power law, for felt, rubber or balls (Hunt and Crossley, J. Appl. Mech.
+// 42, 1975). The damping grows with the depth like the stiffness, so the force does not jump at the
+// first touch. With D = d + t and an exponent P, clamped to at least 1:
 //   d > -t: f = (K + Z v) D^P, else 0
-// Steel and wood have P = 1.5, by Hertz; a piano's hammers 2.3 to 3.5.
+// P is 1.5 for steel and wood (Hertz), and 2.3 to 3.5 for piano hammers.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace ressort::laws {
 inline namespace RESSORT_ISA {
 inline namespace RESSORT_ROUNDING {
 
-// K/(P + 1) D^(P + 1).
+// The potential K/(P + 1) D^(P + 1).
 template <class V>
 struct PowerWall {
   V energy(V d) const { return k / (p + 1) * power(depth(d), p + 1); }
@@ -29,7 +29,6 @@ template <class V>
 struct PowerContact {
   static constexpr LawFacts facts = {
       .name = "power_contact",
-      .family = Family::contact,
       .one = "contact by a power",
       .many = "contacts by a power",
       .count = 4,
@@ -44,10 +43,21 @@ struct PowerContact {
                   .printed = 4}}},
       .zone = Zone::below,
       .is_odd = false,
-      .solve_ns = 250.0,  // by Newton, with powers lane by lane
-      .faust =
-          "power_contact(k, p, z, t, d, v) =\n"
-          "  (k*r*r + z*r*v)*select2(d > 0.0 - t, 0.0, pow(max(d + t, 1e-300), max(p, 1.0)));\n",
+      .solve_ns = 250.0,  // by Newton's method, with powers lane by lane
+      .faust = R"(
+power_contact(k, p, z, t, d, v) =
+  (k + z*v)*select2(d > 0.0 - t, 0.0, pow(max(d + t, 1e-300), max(p, 1.0)));
+steady_power_contact(k, p, z, t, now, speed, way) = 0.0,
+  0.5*z*select2(now + t > 0.0, 0.0, pow(max(now + t, 1e-300), max(p, 1.0)));
+gradient_power_contact(k, p, z, t, b) = discrete(energy, force, slope, b + t)
+with {
+  n = max(p, 1.0);
+  deep(d, a) = select2(d > 0.0, 0.0, pow(max(d, 1e-300), a));
+  energy(d) = k/(n + 1.0)*deep(d, n + 1.0);
+  force(d) = k*deep(d, n);
+  slope(d) = k*n*deep(d, n - 1.0);
+};
+)",
   };
 
   V force(V d, V v) const {
@@ -56,7 +66,7 @@ struct PowerContact {
   V potential(V d) const { return wall().energy(d + t); }
   V secant(V d) const { return k * power(wall().depth(d + t), exponent() - 1); }
 
-  // The potential's discrete gradient, and the damper of now.
+  // The discrete gradient of the potential, and the damper at the current depth.
   V passive(const LinkState<V>& link) const {
     if (!may_touch(link, t)) {
       return V{};
@@ -68,10 +78,10 @@ struct PowerContact {
   }
   Slope<V> gradient(V before, V step) const { return discrete_gradient(wall(), before + t, step); }
 
-  // It grows without bound, as a curved spring.
+  // The slope grows without bound, so `within` limits the depth.
   static Slopes steepest(const PowerContact& least, const PowerContact& most, double within) {
     const double depth = std::max(0.0, within + most.t);
-    // P D^(P - 1) has its summit over P at -1/ln D where D is below 1, and rises beyond.
+    // For D < 1, P D^(P - 1) is largest at P = -1/ln D. For D >= 1 it grows with P.
     const double low = std::max(1.0, least.p);
     const double high = std::max(1.0, most.p);
     const double p = depth < 1.0 ? std::clamp(-1.0 / std::log(depth), low, high) : high;

@@ -1,4 +1,4 @@
-// core/laws: f = K d + Q sgn(d) d^2 + Z v
+// core/laws: a quadratic spring, f = K d + Q sgn(d) d^2 + Z v
 #pragma once
 
 #include "core/laws/spring.h"
@@ -11,7 +11,6 @@ template <class V>
 struct QuadraticSpring {
   static constexpr LawFacts facts = {
       .name = "quadratic_spring",
-      .family = Family::spring,
       .one = "spring that bends",
       .many = "springs that bend",
       .count = 3,
@@ -22,20 +21,34 @@ struct QuadraticSpring {
           {{{.word = "nlSpring2", .least = 3, .most = 3, .arguments = "@A @B K Q Z", .printed = 3},
             {.word = "nlSpring", .least = 3, .most = 3, .arguments = "@A @B K Q Z"}}},
       .contains_spring = true,
-      .solve_ns = 80.0,  // by Newton
-      .faust = "quadratic_spring(k, q, z, d, v) = spring(k, z, d, v) + q*r*r*d*abs(d);\n",
+      .solve_ns = 80.0,  // by Newton's method
+      .faust = R"(
+quadratic_spring(k, q, z, d, v) = spring(k, z, d, v) + q*d*abs(d);
+steady_quadratic_spring(k, q, z, now, speed, way) = 0.0, 0.5*z;
+gradient_quadratic_spring(k, q, z, b, s) = k*(b + 0.5*s) + side*f,
+  0.5*k + select2(crosses, q/3.0*(a + a + c), (q*a*a - f)/both)
+with {
+  after = b + s;
+  a = abs(after);
+  c = abs(b);
+  crosses = after*b < 0.0;
+  side = select2(select2(crosses, after + b, after) < 0.0, 1.0, 0.0 - 1.0);
+  both = select2(crosses, 1.0, a + c);
+  f = q/3.0*(a*a + a*c + c*c)*select2(crosses, 1.0, (a - c)/both);
+};
+)",
   };
 
   V force(V d, V v) const { return k * d + q * d * absolute(d) + z * v; }
   V potential(V d) const { return Scalar<V>(0.5) * k * d * d + curved(d); }
   V secant(V d) const { return k + q * absolute(d); }
 
-  // Of what is curved; the rest holds what a spring does.
+  // The potential of Q sgn(d) d^2 alone.
   V curved(V d) const { return q / Scalar<V>(3.0) * absolute(d * d * d); }
 
-  // f = K now + Z (now - before) + the discrete gradient of Q/3 |d|^3, which without any
-  // cancellation is sgn(after) Q/3 (a^2 + a b + b^2), a and b being |after| and |before|; times
-  // (a - b)/(a + b) where the signs differ.
+  // f = K now + Z (now - before) + the discrete gradient of Q/3 |d|^3, which is
+  // sgn(after) Q/3 (a^2 + a b + b^2) with a = |after| and b = |before|, times (a - b)/(a + b) if the
+  // signs differ. This form is free of cancellation.
   V passive(const LinkState<V>& link) const {
     const V linear = steady(link).force;
     const V before = link.before();

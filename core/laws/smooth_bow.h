@@ -1,4 +1,4 @@
-// core/laws: friction as a bow's, in one smooth curve: f = 0.63 Z v exp(-4 (v/s)^2 + 1/2)
+// core/laws: a bow with a smooth friction curve, f = 0.63 Z v exp(-4 (v/s)^2 + 1/2)
 #pragma once
 
 #include <algorithm>
@@ -9,13 +9,12 @@ namespace ressort::laws {
 inline namespace RESSORT_ISA {
 inline namespace RESSORT_ROUNDING {
 
-inline constexpr double smooth_bow_stick = 1.0387;  // 0.63 exp(1/2), above it: f/(Z v) at rest
+inline constexpr double smooth_bow_stick = 1.0387;  // f/(Z v) at v = 0: 0.63 exp(1/2), rounded up
 
 template <class V>
 struct SmoothBow {
   static constexpr LawFacts facts = {
       .name = "smooth_bow",
-      .family = Family::bow,
       .one = "bow",
       .many = "bows",
       .count = 2,
@@ -26,11 +25,21 @@ struct SmoothBow {
                   .arguments = "@A @B Z SCALE [PROFILE]",
                   .printed = 2,
                   .tail = " 1"}}},
+      .is_friction = true,
       .is_convex = false,
       .solve_ns = 75.0,
-      .faust =
-          "smooth_bow(z, s, d, v) = 0.63*z*r*v*exp(0.5 - 4.0*ratio*ratio) "
-          "with { ratio = v/(s*r); };\n",
+      .faust = R"(
+smooth_bow(z, s, d, v) = 0.63*z*v*exp(0.5 - 4.0*ratio*ratio) with { ratio = v/s; };
+steady_smooth_bow(z, s, now, speed, way) = 0.0, 0.0;
+gradient_smooth_bow(z, s, b, step) = rubbed(z, s, 0.5*step) : _, *(0.5);
+alone_smooth_bow(z, s, f, damping, b, speed, way, gamma) =
+  between(24, rubbed(z, s), 0.0, speed, 0.5*way, 0.5*gamma);
+rubbed(z, s, v) = grip*v, grip*(1.0 - 8.0*ratio*ratio)
+with {
+  ratio = min(1000.0, abs(v/s));
+  grip = 0.63*z*exp(0.5 - 4.0*ratio*ratio);
+};
+)",
   };
 
   V force(V, V v) const {
@@ -52,7 +61,8 @@ struct SmoothBow {
     return {grip * v, grip * (1 - 8 * ratio * ratio)};
   }
 
-  // The friction f(v) at the speed v that solves v + half f(v) = wanted, from the speed `last` on.
+  // Returns the friction f(v) at the speed v that solves v + half f(v) = wanted, by Newton's method
+  // from the speed `last`.
   V grip(V wanted, V last, V half) const {
     return force_between(V{}, last, wanted, half, [&](V v) { return friction(v); });
   }
@@ -62,7 +72,7 @@ struct SmoothBow {
   }
   static Slopes gentlest(const SmoothBow& least) { return {.damping = std::min(0.0, least.z)}; }
 
-  // The speed in scales; so far that nothing is left, where there is no scale.
+  // Returns |v|/s, clamped to 1000, where the friction is 0. This also covers s = 0.
   V slip(V v) const {
     const V most = V{} + 1000;
     const V ratio = absolute(v / s);

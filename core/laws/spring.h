@@ -1,4 +1,4 @@
-// core/laws: f = K d + Z v. Springs, dampers, and both together; the only linear law.
+// core/laws: a spring with a damper, f = K d + Z v. This is the only linear law.
 #pragma once
 
 #include "core/laws/discrete_gradient.h"
@@ -11,7 +11,6 @@ template <class V>
 struct Spring {
   static constexpr LawFacts facts = {
       .name = "spring",
-      .family = Family::spring,
       .one = "spring",
       .many = "springs",
       .count = 2,
@@ -33,7 +32,15 @@ struct Spring {
       .contains_spring = true,
       .is_curved = false,
       .solve_ns = 16.0,
-      .faust = "spring(k, z, d, v) = k*r*r*d + z*r*v;\n",
+      .faust = R"(
+spring(k, z, d, v) = k*d + z*v;
+steady_spring(k, z, now, speed, way) = 0.0, 0.5*z;
+gradient_spring(k, z, b, s) = k*(b + 0.5*s), 0.5*k;
+alone_spring(k, z, f, damping, b, speed, way, gamma) = (k*b + h*way)/(1.0 + h*gamma)
+with {
+  h = 0.5*k + damping;
+};
+)",
   };
 
   V force(V d, V v) const { return k * d + z * v; }

@@ -1,5 +1,5 @@
-// What the third state argument means: asked for, said in the text, shown by its dialect, or told
-// by the states themselves.
+// Decides the meaning of the third state argument: by option, by a line of the text, by its
+// dialect, or by the states themselves.
 #include "core/model/language/reader.h"
 
 namespace ressort::model {
@@ -54,7 +54,7 @@ void Reader::decide_motion(const ReadOptions& options) {
   }
 }
 
-// MIMS4Max wins over MIMS, being the one that is still written.
+// If a text has features of both dialects, MIMS4Max wins, because it is still in use.
 void Reader::decide_by_dialect() {
   if (velocity_.line == 0) {
     return choose_motion(
@@ -66,11 +66,11 @@ void Reader::decide_by_dialect() {
     return;
   }
   const auto doubt = [&](const auto& element) {
-    say(Severity::warning, element.location.line, {element.name, element.location.column},
-        "its motion is read as " + out_.motion + "; but " + line_of(delayed_.line) + " " +
-            std::string(delayed_.what) +
-            ", which is MIMS: '~motion delayed' reads the motions as "
-            "MIMS does, '~motion velocity' ends this doubt");
+    report(Severity::warning, element.location.line, {element.name, element.location.column},
+           "its motion is read as " + out_.motion + "; but " + line_of(delayed_.line) + " " +
+               std::string(delayed_.what) +
+               ", which is MIMS: add '~motion delayed' to read the "
+               "motions as MIMS does, or '~motion velocity' to keep this reading");
   };
   for (const Mass& mass : out_.network.masses) {
     if (moves(mass) && mass.third != 0.0) {
@@ -84,8 +84,9 @@ void Reader::decide_by_dialect() {
   }
 }
 
-// Rest away from 0 is written (x, x) in one meaning and (x, 0) in the other; and who starts from 0
-// with a speed writes (0, x), which is a tiny one per second.
+// Rest away from 0 is written (x, x) in one meaning and (x, 0) in the other. (0, x) starts at 0
+// with a velocity; read as a velocity per second it would be tiny, so it indicates a delayed
+// position.
 void Reader::decide_by_states() {
   Network& network = out_.network;
   const Mass* shows_delayed = nullptr;
@@ -100,22 +101,23 @@ void Reader::decide_by_states() {
     }
   }
   if (shows_delayed == nullptr && shows_velocity == nullptr) {
-    return choose_motion(delayed, "nothing shows another meaning");
+    return choose_motion(delayed, "nothing indicates the other meaning");
   }
   if (shows_delayed == nullptr) {
-    return choose_motion(velocity,
-                         line_of(shows_velocity->location.line) + " has a rest away from 0 with 0");
+    return choose_motion(
+        velocity, line_of(shows_velocity->location.line) + " rests away from 0 with a motion of 0");
   }
   const bool is_rest = shows_delayed->position != 0.0;
-  choose_motion(delayed, line_of(shows_delayed->location.line) +
-                             (is_rest ? " has a rest with the position itself" : " starts from 0"));
+  choose_motion(delayed,
+                line_of(shows_delayed->location.line) +
+                    (is_rest ? " rests with a motion equal to its position" : " starts from 0"));
   if (shows_velocity == nullptr) {
     return;
   }
-  say(Severity::warning, shows_velocity->location.line,
-      {shows_velocity->name, shows_velocity->location.column},
-      "a motion of 0 is read as rest, although the motion is " + out_.motion +
-          "; '~motion velocity' or '~motion delayed' ends this doubt");
+  report(Severity::warning, shows_velocity->location.line,
+         {shows_velocity->name, shows_velocity->location.column},
+         "a motion of 0 is read as rest, although motions are " + out_.motion +
+             "; add '~motion velocity' or '~motion delayed' to decide");
   for (Mass& mass : network.masses) {
     if (moves(mass) && mass.third == 0.0) {
       mass.third = mass.position;

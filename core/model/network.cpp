@@ -122,7 +122,7 @@ class Renumbering {
     }
   }
 
-  // Where the mass at one end is now; a point is made anew for every end.
+  // Returns the new index of the mass at one end. Each end gets a point of its own.
   std::uint32_t end(std::uint32_t index) {
     if (places_[index] != unplaced) {
       return places_[index];
@@ -189,9 +189,9 @@ double argument_value(const Network& network, ArgumentId argument,
 
 LinearPart linear_part(const Link& link) {
   const LawFacts& law = facts_of(link.law);
-  return law.family == Family::spring ? LinearPart{link.arguments[law.slot(Role::stiffness)],
-                                                   link.arguments[law.slot(Role::damping)]}
-                                      : LinearPart{};
+  return law.is_spring() ? LinearPart{link.arguments[law.slot(Role::stiffness)],
+                                      link.arguments[law.slot(Role::damping)]}
+                         : LinearPart{};
 }
 
 double level_value(const Network& network, const Output& output,

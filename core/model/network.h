@@ -1,4 +1,4 @@
-// core/model: what a musician describes. Names, numbers as written, double. A value type.
+// core/model: the network of a model file, with names and with numbers as written. A value type.
 #pragma once
 
 #include <array>
@@ -13,17 +13,17 @@
 
 namespace ressort::model {
 
-// Where an element stands in its text; both count from 1.
+// Position of an element in its text, counted from 1.
 struct SourceLocation {
   int line = 0;
   int column = 0;
   bool operator==(const SourceLocation&) const {
     return true;
-  }  // the same network, wherever it is written
+  }  // equal networks may differ in their layout
 };
 
-// A scalar that may change while the network sounds: turned by a person, or, if `audio_input` is
-// not 0, read from that input for every sample. Numbers are per sample at 44 100 Hz (see Network).
+// A scalar that may change while the network sounds: a player changes it, or, if `audio_input` is
+// not 0, that input sets it in every sample. Numbers are per sample at 44 100 Hz (see Network).
 struct Parameter {
   std::string name;
   double value = 0.0;
@@ -32,8 +32,8 @@ struct Parameter {
   bool operator==(const Parameter&) const = default;
 };
 
-// Index into Network::arguments. Equal texts share one entry, so a string of a thousand masses
-// has three.
+// Index into Network::arguments. Equal texts share one entry, so a string of a thousand masses has
+// only three.
 using ArgumentId = std::uint32_t;
 inline constexpr ArgumentId no_argument = 0xffffffffu;
 
@@ -41,8 +41,8 @@ enum class MassKind : std::uint8_t {
   mass,        // x[n+1] = 2x[n] - x[n-1] + (F - g)/M
   oscillator,  // the same, with a spring and a damper to a ground at 0
   ground,      // never moves
-  position,    // follows an input; has no inertia
-  point,       // a place on a macro, between its nodes (see Tap); has no inertia
+  position,    // follows an input; without inertia
+  point,       // a place on a macro, between its nodes (see Tap); without inertia
   junction,    // a place on a waveguide of an expanded network; its M is the impedance
 };
 
@@ -55,18 +55,18 @@ struct Mass {
   ArgumentId gravity = no_argument;    // g, a force towards -x
   bool gravity_per_rate = false;       // MIMS4Max divides g by the reference rate, MIMS does not
   double position = 0.0;               // x0
-  double third = 0.0;                  // the last state argument; Network::third says what it means
+  double third = 0.0;                  // the last state argument; Network::third is its meaning
   std::uint32_t tap = 0;               // index into Network::taps, points only
-  // An oscillator that is a mode of a body: K and Z are those of the continuous network, and its
-  // frequency and decay are theirs at any rate (core/sampled_mode.h).
+  // True for an oscillator that is a mode of a body. K and Z are those of the continuous network;
+  // the sampled oscillator keeps its frequency and decay at every rate (core/sampled_mode.h).
   bool is_mode = false;
-  bool is_fixed = false;      // a key leaves its stiffness as it is
+  bool is_fixed = false;      // keys do not change its stiffness
   std::uint32_t drawing = 0;  // 1 + index into Network::drawings; 0 for none
   SourceLocation location;
   bool operator==(const Mass&) const = default;
 };
 
-// What is not held, driven or a place on a macro.
+// Returns true for masses and oscillators.
 inline bool moves(const Mass& mass) {
   return mass.kind == MassKind::mass || mass.kind == MassKind::oscillator;
 }
@@ -78,13 +78,13 @@ enum class MacroKind : std::uint8_t {
   mesh,            // a rectangle, neighbours linked by K, Z
   closed_mesh,     // with its border fixed
   corner_mesh,     // with its corners fixed
-  body,            // modes, which are its nodes, and named places on it (see BodyMode)
-  waveguide,       // a string as two waves, held at both ends
+  body,            // modes, which are its nodes, and named places (see BodyMode)
+  waveguide,       // a string as two travelling waves, with fixed ends
   open_waveguide,  // the same with free ends
 };
 
-// Many masses in one line. Nodes are numbered row by row; every one that moves has mass M, and
-// with air damping a damper Zo to 0.
+// Many masses in one line of the model. Nodes are numbered row by row. Each moving node has mass M,
+// and a damper Zo to 0 if there is air damping.
 struct Macro {
   std::string name;
   MacroKind kind = MacroKind::string;
@@ -95,22 +95,22 @@ struct Macro {
   ArgumentId second_stiffness = no_argument;  // K2
   ArgumentId damping = no_argument;
   ArgumentId air_damping = no_argument;  // Zo
-  // Of waveguides, which have no nodes:
+  // Waveguides only, which have no nodes:
   ArgumentId impedance = no_argument;     // R, force per velocity
   ArgumentId frequency_hz = no_argument;  // of the lowest partial
-  ArgumentId t60_s = no_argument;         // the same
+  ArgumentId t60_s = no_argument;         // of the lowest partial
   ArgumentId brightness = no_argument;    // 0..1
-  std::vector<std::string> places;        // names, of a body only
+  std::vector<std::string> places;        // names, bodies only
   double position = 0.0;                  // of every node
-  double third = 0.0;                     // as of Mass
+  double third = 0.0;                     // see Mass
   std::uint32_t drawing = 0;
-  bool is_fixed = false;  // a key leaves all of its stiffness as it is
+  bool is_fixed = false;  // keys do not change its stiffness
   SourceLocation location;
   bool operator==(const Macro&) const = default;
 };
 
-// A mode of a body: an oscillator of the body's mass, and how far each place moves when it moves
-// by 1.
+// A mode of a body: an oscillator with the body's mass, and the displacement of each place when the
+// oscillator moves by 1.
 struct BodyMode {
   Name name;
   std::uint32_t macro = 0;
@@ -124,23 +124,23 @@ inline bool by_body(const BodyMode& a, const BodyMode& b) {
   return a.macro < b.macro;
 }
 
-// A place on a macro by coordinates 0..1, interpolated between the nodes around it; on a body,
-// between the shapes at the two places around it.
+// A place on a macro, by coordinates from 0 to 1. Its position is interpolated between the nodes
+// around it; on a body, between the mode shapes at two named places.
 struct Tap {
   std::uint32_t macro = 0;
-  ArgumentId u = no_argument;  // along the length, or from a body's first place to its last
+  ArgumentId u = no_argument;  // along the length; on a body, from its first place to its last
   ArgumentId v = no_argument;  // along the width
-  // Where the macro's nodes are, once it is expanded: masses [first, first + length * width).
+  // Nodes of the expanded macro: masses [first, first + length * width).
   std::uint32_t first = 0;
   std::uint32_t length = 0;
   std::uint32_t width = 0;
-  // And the shapes of a body's places: Network::shapes from here on, [place][mode].
-  std::uint32_t places = 0;  // 0: no body
+  // Mode shapes of an expanded body: Network::shapes from `shape` on, [place][mode].
+  std::uint32_t places = 0;  // 0: not a body
   std::uint32_t shape = 0;
   bool operator==(const Tap&) const = default;
 };
 
-// Where an element is drawn; of no consequence to the sound.
+// Position of an element in a drawing; does not affect the sound.
 struct Drawing {
   Name group;
   double x = 0.0;
@@ -148,7 +148,7 @@ struct Drawing {
   bool operator==(const Drawing&) const = default;
 };
 
-// Between two masses, first and second as written: a link's force f acts as F_a -= f, F_b += f.
+// A link between two masses, in the order of the text. Its force f acts as F_a -= f, F_b += f.
 struct Link {
   Name name;
   Law law{};
@@ -156,19 +156,19 @@ struct Link {
   std::uint32_t b = 0;
   std::array<ArgumentId, most_law_arguments> arguments = {no_argument, no_argument, no_argument,
                                                           no_argument, no_argument};
-  bool is_fixed = false;  // a key leaves its stiffness as it is
+  bool is_fixed = false;  // keys do not change its stiffness
   SourceLocation location;
   bool operator==(const Link&) const = default;
 };
 
-// What a link does near rest: its K and Z. Plucks, bows and contacts do nothing there.
+// K and Z of a link near rest. Empty for plucks, bows and contacts.
 struct LinearPart {
   ArgumentId stiffness = no_argument;
   ArgumentId damping = no_argument;
 };
 LinearPart linear_part(const Link& link);
 
-// Input N of the model: either the position of a mass of kind `position`, or a force on any mass.
+// Input N of the model: the position of a mass of kind `position`, or a force on any mass.
 struct Input {
   int number = 1;  // N of @inN
   bool is_force = false;
@@ -177,8 +177,8 @@ struct Input {
   bool operator==(const Input&) const = default;
 };
 
-// Output N of the model: the position of a mass, or the force on it, times a level. Outputs of the
-// same number add up.
+// Output N of the model: the position of a mass, or the force on it, times a level. Outputs with
+// the same number are added.
 struct Output {
   int number = 1;
   bool is_force = false;
@@ -188,23 +188,23 @@ struct Output {
   bool operator==(const Output&) const = default;
 };
 
-// What the third state argument of `mass` and `osc` says; the dialects disagree.
+// Meaning of the third state argument of `mass` and `osc`, which depends on the dialect.
 enum class ThirdArgument : std::uint8_t {
-  delayed_position,    // x[-1] of the tick before: MIMS and the older FAUST tools
+  delayed_position,    // x[-1], one sample before: MIMS and the older FAUST tools
   velocity_per_second  // in position units per second: MIMS4Max
 };
 
 // Numbers are dimensionless and per sample at `reference_rate_hz`: M = m/dt^2, K = k, Z = z/dt.
 struct Network {
   std::vector<Parameter> parameters;
-  std::vector<Formula> arguments;  // the distinct arguments of all elements
+  std::vector<Formula> arguments;  // distinct arguments of all elements
   std::vector<Drawing> drawings;
-  std::vector<Mass> masses;  // grounds and position inputs too, as declared
+  std::vector<Mass> masses;  // grounds and position inputs too, in the order of the text
   std::vector<Macro> macros;
-  std::vector<BodyMode> modes;    // by body
-  std::vector<Macro> waveguides;  // of an expanded network, as nothing can be written out for them
+  std::vector<BodyMode> modes;    // sorted by body
+  std::vector<Macro> waveguides;  // of an expanded network; they have no nodes
   std::vector<Tap> taps;
-  std::vector<double> shapes;  // of expanded bodies, see Tap
+  std::vector<double> shapes;  // of expanded bodies; see Tap
   std::vector<Link> links;
   std::vector<Input> inputs;    // sorted by number
   std::vector<Output> outputs;  // sorted by number
@@ -214,34 +214,35 @@ struct Network {
   static constexpr double reference_rate_hz = 44100.0;
 };
 
-// The same network in the one form that equal networks share. Masses come as declared, then
-// position inputs by their number, then points, one for every end that uses one; inputs and outputs
-// are sorted by number. Formulas, drawings and taps are numbered in the order in which masses,
-// macros, points and links first use them, equal ones once, unused ones not at all. O(n) in time
-// and memory. [any thread but audio]
+// Returns the canonical form of a network, which is the same for equal networks. Masses come first
+// in the order of the text, then position inputs by number, then points, one for each end that uses
+// one. Inputs and outputs are sorted by number. Formulas, drawings and taps are numbered in the
+// order of their first use by masses, macros, points and links; duplicates and unused ones are
+// removed. O(n) in time and memory. [any thread but audio]
 Network canonical(Network network);
 
-// The argument's value with the parameters as given; 0 for no_argument.
+// Returns an argument's value with these parameters; 0 for no_argument.
 double argument_value(const Network& network, ArgumentId argument,
                       std::span<const double> parameters);
 
-// What an output is multiplied by.
+// Returns the level of an output.
 double level_value(const Network& network, const Output& output,
                    std::span<const double> parameters);
 
-// The parameters' values as the text declares them.
+// Returns the parameters' values in the text.
 std::vector<double> parameter_values(const Network& network);
 
-// The change of position from one sample to the next that a mass starts with.
+// Returns the velocity of a mass at the start, per sample.
 double initial_velocity(const Network& network, const Mass& mass);
 
-// Does everything that moves start with two zeros? Then the third argument's meanings agree.
+// Returns true if all moving masses start at 0, at rest. Both meanings of the third argument then
+// agree.
 bool rests_at_zero(const Network& network);
 
-// How many masses move, macros apart.
+// Returns the number of moving masses outside of macros.
 std::size_t moving_count(const Network& network);
 
-// The highest channel number in use; 0 for none.
+// Return the highest channel number in use; 0 for none.
 int input_count(const Network& network);
 int output_count(const Network& network);
 

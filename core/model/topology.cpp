@@ -6,12 +6,12 @@
 #include <tuple>
 #include <utility>
 
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 
 namespace ressort::model {
 namespace {
 
-constexpr std::uint32_t nodes_at_once = 4096;  // between two looks at whether to go on
+constexpr std::uint32_t nodes_at_once = 4096;  // nodes between two checks for cancellation
 
 // Appends the masses of one macro.
 void add_nodes(const Macro& macro, const Progress& progress, Network& network) {
@@ -74,7 +74,7 @@ void append(Formula& formula, const Formula& part) {
   formula.insert(formula.end(), part.begin(), part.end());
 }
 
-// M ((2 pi f)^2 + (ln 1000 / T60)^2), per sample.
+// Returns M ((2 pi f)^2 + (ln 1000 / T60)^2), per sample.
 Formula mode_stiffness(const Formula& mass, const Formula& frequency_hz, const Formula& t60_s) {
   constexpr double turn = 2.0 * std::numbers::pi / Network::reference_rate_hz;
   constexpr double decay = 3.0 * std::numbers::ln10 / Network::reference_rate_hz;
@@ -87,7 +87,7 @@ Formula mode_stiffness(const Formula& mass, const Formula& frequency_hz, const F
   return folded(std::move(formula));
 }
 
-// 2 M ln 1000 / T60, per sample.
+// Returns 2 M ln 1000 / T60, per sample.
 Formula mode_damping(const Formula& mass, const Formula& t60_s) {
   Formula formula = mass;
   append(formula, {{Op::number, 0, 6.0 * std::numbers::ln10 / Network::reference_rate_hz}});
@@ -96,7 +96,7 @@ Formula mode_damping(const Formula& mass, const Formula& t60_s) {
   return folded(std::move(formula));
 }
 
-// A body's modes as oscillators, and its shapes.
+// Appends a body's modes as oscillators, and its mode shapes.
 void add_modes(const Network& network, std::uint32_t body, const Progress& progress,
                Network& expanded) {
   const Macro& macro = network.macros[body];
@@ -128,9 +128,9 @@ void add_modes(const Network& network, std::uint32_t body, const Progress& progr
   }
 }
 
-// A place on a macro is one node for all ends that name the same, and on a waveguide a junction.
+// Merges points with equal coordinates into one node, which on a waveguide is a junction.
 void join_places(const Network& network, Network& expanded) {
-  std::vector<std::uint32_t> waveguide;  // [macro] which of the waveguides it is
+  std::vector<std::uint32_t> waveguide;  // [macro] index among the waveguides
   for (const Macro& macro : network.macros) {
     waveguide.push_back(static_cast<std::uint32_t>(expanded.waveguides.size()));
     if (is_waveguide(macro.kind)) {
@@ -138,7 +138,7 @@ void join_places(const Network& network, Network& expanded) {
     }
   }
   std::map<std::tuple<std::uint32_t, ArgumentId, ArgumentId>, std::uint32_t> known;
-  std::vector<std::uint32_t> same(expanded.masses.size());  // [mass] which one stands for it
+  std::vector<std::uint32_t> same(expanded.masses.size());  // [mass] the one that replaces it
   for (std::uint32_t i = 0; i < same.size(); ++i) {
     Mass& mass = expanded.masses[i];
     same[i] = i;
@@ -149,7 +149,7 @@ void join_places(const Network& network, Network& expanded) {
     const Macro& macro = network.macros[tap.macro];
     same[i] = known.try_emplace({tap.macro, tap.u, tap.v}, i).first->second;
     if (same[i] != i) {
-      mass.kind = MassKind::ground;  // that nobody holds
+      mass.kind = MassKind::ground;  // unused from here on
     } else if (is_waveguide(macro.kind)) {
       tap.macro = waveguide[tap.macro];
       mass.kind = MassKind::junction;
@@ -170,8 +170,9 @@ void join_places(const Network& network, Network& expanded) {
   }
 }
 
-// What is straight of a spring that bends is a link of its own at a waveguide: there each is found
-// by its discrete gradient, and in a spring that bends that part is not (core/laws/law.h).
+// Splits the linear part of a curved spring at a waveguide into a link of its own. There both parts
+// are solved by discrete gradients, but the passive form of a curved spring keeps the linear part
+// as published (see contains_spring in core/laws/law.h).
 void split_springs(Network& network) {
   const auto is_junction = [&](std::uint32_t mass) {
     return network.masses[mass].kind == MassKind::junction;

@@ -1,13 +1,16 @@
-// tests: one small network for each thing that FAUST shall be told, by name.
+// tests: one small network for each feature of the FAUST export, by name.
 #pragma once
 
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "core/laws/law.h"
 #include "tests/support/networks/scenes.h"
 
 namespace ressort::scenes {
+
+using namespace laws;
 
 // A mass between a wall and a link of the given law to what input 2 holds; input 1 pushes it.
 inline std::string law(const std::string& link) {
@@ -21,6 +24,54 @@ inline std::string played(const std::string& macro, const std::string& from,
                           const std::string& to) {
   return "@s " + macro + "\n@in1 frcInput [@s " + from + "]\n@out1 posOutput [@s " + to +
          "]\n@out2 frcOutput [@s " + to + "]\n";
+}
+
+// Returns a link by the first keyword of a law, with typical values. A bow's profile is parameter
+// p.
+inline std::string link_of(const LawFacts& law, const std::string& ends) {
+  std::string text = std::string(law.words[0].word) + " " + ends;
+  for (std::size_t i = 0; i < law.count; ++i) {
+    const LawArgument& argument = law.arguments[i];
+    switch (argument.role) {
+      case Role::stiffness:
+        text += " 0.03";
+        break;
+      case Role::bend:
+        text += " 0.3";
+        break;
+      case Role::limit:
+        text += " 0.1";
+        break;
+      case Role::damping:
+        text += " 0.02";
+        break;
+      case Role::reach:
+        text += " 0.05";
+        break;
+      case Role::shape:
+        text +=
+            argument.least < 0.0 ? std::string(" p") : " " + std::to_string(argument.least + 0.7);
+        break;
+    }
+  }
+  return text + std::string(law.words[0].tail);
+}
+
+inline std::string on_a_waveguide(const std::string& link) {
+  return "@p param 0.\n@s waveguide 1.1 217. 4. 0.4 0.\n@in1 frcInput [@s 0.2]\n@in2 posInput "
+         "0.\n@l " +
+         link + "\n@out1 posOutput [@s 0.7]\n@out2 frcOutput @in2\n";
+}
+
+// Every law of the list, between a mass and input 2, and between a waveguide and input 2.
+inline std::vector<std::pair<std::string, std::string>> models_of_laws() {
+  std::vector<std::pair<std::string, std::string>> all;
+  for (const LawFacts& facts : law_table()) {
+    const std::string name(facts.name);
+    all.emplace_back("mass_" + name, "@p param 0.\n" + law(link_of(facts, "@m @in2")));
+    all.emplace_back("waveguide_" + name, on_a_waveguide(link_of(facts, "[@s 0.4] @in2")));
+  }
+  return all;
 }
 
 inline const std::vector<std::pair<std::string, std::string>>& faust_models() {
@@ -52,8 +103,7 @@ inline const std::vector<std::pair<std::string, std::string>>& faust_models() {
        "@b4 mode @b 5. 0.002 0.2 0.1 -0.4\n@m mass 1. 0. 0.\n@in1 frcInput [@b x]\n"
        "@in2 posInput 0.\n@l contact [@b y] @in2 0.1 0.01\n@r spring [@b p] @m 0.05 0.01\n"
        "@out1 posOutput [@b z]\n@out2 frcOutput [@b 0.3]\n"},
-      // Waveguides: one alone, open and held, several at one place with everything that may be
-      // there, and with sliders.
+      // Waveguides: free, with open ends, held by springs, and with sliders.
       {"waveguide", played("waveguide 1.3 217. 4. 0.3 0.", "0.37", "0.23")},
       {"open_waveguide", played("openWaveguide 0.7 583. 0.2 1. 0.3", "0", "1")},
       {"held_waveguide",
@@ -63,19 +113,17 @@ inline const std::vector<std::pair<std::string, std::string>>& faust_models() {
        "@in1 frcInput [@s 0.2]\n@in2 posInput 0.\n@h spring @in2 [@s 0.5] 0.05 0.3\n"
        "@out1 posOutput [@s 0.4]\n@out2 frcOutput @m\n@out3 frcOutput [@s 0.93]\n"},
       {"waveguides_on_a_box",
-       "@s waveguide 1. 110. 5. 0.3 0.\n@t waveguide 0.8 146.8 5. 0.3 0.\n"
-       "@o openWaveguide 0.5 97. 3. 0.6 0.\n@b body 40. bridge top\n"
-       "@b1 mode @b 104. 0.4 1. 0.3\n@b2 mode @b 211. 0.3 0.8 -0.5\n@b3 mode @b 393. 0.2 -0.6 0.9\n"
-       "@e string 6 2. 0.3 0.001 0. 0.\n@m mass 4. 0. 0.\n@g ground 0.\n"
-       "@ks spring [@s 0.97] [@b bridge] 0.5 0.01\n@kt spring [@t 0.97] [@b bridge] 0.4\n"
-       "@ko spring [@o 1] [@b 0.3] 5. 0.1\n@kst spring [@s 0.97] [@t 0.6] 0.02 0.002\n"
-       "@ke spring [@t 0.3] [@e 0.55] 30. 0.1\n@ke2 damper [@e 0.7] [@s 0.5] 0.2\n"
+       "@s waveguide 1. 110. 5. 0.3 0.\n@o openWaveguide 0.5 97. 3. 0.6 0.\n"
+       "@b body 40. bridge top\n@b1 mode @b 104. 0.4 1. 0.3\n@b2 mode @b 211. 0.3 0.8 -0.5\n"
+       "@b3 mode @b 393. 0.2 -0.6 0.9\n@e string 6 2. 0.3 0.001 0. 0.\n@m mass 4. 0. 0.\n"
+       "@g ground 0.\n@ks spring [@s 0.97] [@b bridge] 0.5 0.01\n"
+       "@ko spring [@o 1] [@e 0.55] 5. 0.1\n@kso spring [@s 0.3] [@o 0.6] 0.02 0.002\n"
        "@kg spring @g [@o 0.2] 0.01\n@km spring [@s 0.5] @m 0.1\n@in1 frcInput [@s 0.21]\n"
        "@in2 frcInput [@b top]\n@p nlPluck @in3 @m 0.01 0.1\n@in3 posInput 0.\n"
        "@out1 posOutput [@b top]\n@out2 posOutput [@o 0]\n@out3 frcOutput [@b bridge]\n"
        "@out4 posOutput [@e 0.2]\n@out5 frcOutput @g\n@out6 posOutput @m\n"},
-      // What plucks, rubs and touches waveguides: each law alone, several at one place, what starts
-      // pressed, what flies there, and ends that channels move.
+      // Links of every law that hold waveguides: at rest, under tension at the start, thrown, and
+      // with ends that channels move.
       {"laws_on_waveguides",
        "@p param 0.\n@s1 waveguide 1.1 217. 4. 0.4 0.\n@s2 waveguide 0.9 163. 4. 0.4 0.\n"
        "@s3 openWaveguide 1.3 191. 1. 0.4 0.\n@in1 frcInput [@s1 0.2]\n@in2 posInput 0.\n"
@@ -88,15 +136,6 @@ inline const std::vector<std::pair<std::string, std::string>>& faust_models() {
        "@l11 nlSpringDamper @in2 [@s3 0.7] 0.01 0.5 0.1 0.002\n@out1 posOutput [@s1 0.5]\n"
        "@out2 posOutput [@s2 0.5]\n@out3 posOutput [@s3 0.6]\n@out4 frcOutput @in2\n"
        "@out5 frcOutput [@s3 0.5]\n"},
-      {"laws_at_one_place",
-       "@s waveguide 1.1 217. 4. 0.4 0.\n@m mass 2. 0. 0.\n@g ground 0.\n@t spring @g @m 0.02 "
-       "0.01\n"
-       "@k spring [@s 0.37] @m 0.2 0.01\n@in1 frcInput [@s 0.2]\n@in2 posInput 0.\n"
-       "@in3 posInput 0.\n@l nlPluck @in2 [@s 0.37] 0.1 0.1 0.01\n@b nlBow @in3 [@s 0.37] 0.6 "
-       "0.02\n"
-       "@c contact @in2 [@s 0.37] 0.1 0.01 -0.02\n@d powerContact @in3 @m 0.1 1.5 0.02\n"
-       "@e nlSpring3 @in3 [@s 0.37] 0.01 0.3 0.001\n@out1 posOutput [@s 0.37]\n"
-       "@out2 frcOutput [@s 0.37]\n@out3 posOutput @m\n@out4 frcOutput @in2\n"},
       {"hammer_on_a_waveguide",
        "@s waveguide 1.1 217. 4. 0.4 0.\n@h mass 3. -0.02 30.\n@b body 5. x\n"
        "@b1 mode @b 210. 0.8 1.\n@b2 mode @b 900. 0.2 -0.5\n"
@@ -117,7 +156,7 @@ inline const std::vector<std::pair<std::string, std::string>>& faust_models() {
        "0.1 40.\n"
        "@k1 spring [@s 0.4] [@b q] 0.2 0.01\n@k2 nlSpring3 [@t 0.3] [@e q] 0.1 0.3 0.01\n"
        "@k3 nlBow [@s 0.8] @m 0.3 0.02\n@k4 contact [@t 0.7] @o 0.1 0.01 -0.5\n"
-       "@k5 spring [@t 0.9] [@e 0.05] 0.01 0.001\n"
+       "@e2 string 5 2. 0.3 0.001 0. 0.1\n@k5 spring [@t 0.9] [@e2 0.05] 0.01 0.001\n"
        "@in1 frcInput [@s 0.7]\n@in2 posInput 0.\n@in3 frcInput @m\n@in5 frcInput @o\n"
        "@out1 posOutput [@s 0.4]\n@out2 posOutput [@b y]\n@out3 frcOutput @m\n"
        "@out4 posOutput [@e 0.5]\n@out5 posOutput @o\n"},

@@ -7,7 +7,7 @@
 
 #include "core/analysis/continuous.h"
 #include "core/analysis/linear.h"
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 #include "core/model/generate.h"
 #include "core/model/language/mdl.h"
 #include "core/model/topology.h"
@@ -82,7 +82,7 @@ Network string_on_stop() {
   };
   Mass stop{.kind = MassKind::ground, .position = -0.02, .third = -0.02};
   network.masses.push_back(stop);
-  Link touch{.law = Law::contact,
+  Link touch{.law = law_named("contact"),
              .a = static_cast<std::uint32_t>(network.masses.size() - 1),
              .b = mass_called(network, "s_m20")};
   touch.arguments = {number(10.0), number(0.0), number(0.0), no_argument, no_argument};
@@ -92,7 +92,7 @@ Network string_on_stop() {
 
 bool has_contacts(const Network& network) {
   return std::any_of(network.links.begin(), network.links.end(),
-                     [](const Link& link) { return facts_of(link.law).family == Family::contact; });
+                     [](const Link& link) { return facts_of(link.law).is_one_sided(); });
 }
 
 double value_of(const ControlSetting& control) {

@@ -10,7 +10,7 @@
 #include "core/analysis/modes/scaling.h"
 #include "core/engine/midi/velocity_curve.h"
 #include "core/gesture.h"
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 #include "core/model/language/expression.h"
 #include "core/model/preset/fit.h"
 #include "core/model/topology.h"
@@ -83,7 +83,7 @@ std::optional<Error> not_linear(const Scene& scene) {
     return Error{scene.name + " has a waveguide, which has no modes of this kind" + so};
   }
   for (const Link& link : scene.network.links) {
-    if (link.law != Law::spring) {
+    if (!is_linear(link.law)) {
       const std::string what = "a " + std::string(facts_of(link.law).one);
       return Error{
           to_string(finding_in_model(scene, {scene.name + " is not linear: here is " + what + so,

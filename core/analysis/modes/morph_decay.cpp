@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/analysis/linear.h"
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 #include "core/model/topology.h"
 
 namespace ressort::analysis {
@@ -139,7 +139,7 @@ Network with_even_decay(Network network, const MorphedDecay& morph) {
   }
   for (Link& link : network.links) {
     const LawFacts& law = facts_of(link.law);
-    if (law.family == Family::spring) {
+    if (law.is_spring()) {
       damp(link.arguments[law.slot(Role::damping)]);
     }
   }

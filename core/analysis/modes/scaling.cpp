@@ -6,7 +6,7 @@
 #include <numeric>
 #include <utility>
 
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 #include "core/model/topology.h"
 
 namespace ressort::analysis {
@@ -17,7 +17,7 @@ constexpr double decay_60_db = 3.0 * std::numbers::ln10;
 using Kind = SpringLine::Kind;
 
 bool is_spring(const Link& link) {
-  return facts_of(link.law).family == Family::spring;
+  return facts_of(link.law).is_spring();
 }
 
 // Connected components of masses and macros.

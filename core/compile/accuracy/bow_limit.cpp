@@ -7,7 +7,7 @@
 
 #include "core/analysis/assembly.h"
 #include "core/analysis/places.h"
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 #include "core/model/language/expression.h"
 
 namespace ressort::compile {
@@ -18,7 +18,7 @@ constexpr double steps_of_oversampled = 4.0;  // of --method oversampled
 constexpr double highest_rate_hz = 768'000.0;
 
 bool is_bow(Law law, Scheme scheme) {
-  return facts_of(law).family == Family::bow && scheme != Scheme::plain;
+  return facts_of(law).is_friction && scheme != Scheme::plain;
 }
 
 // Returns the displacement of both ends for a force of 1 during one sample, 1/M summed over the

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/kernels/taps.h"
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 #include "core/linear_algebra/eigen.h"
 
 namespace ressort::compile {
@@ -114,7 +114,7 @@ bool has_linear_springs(const Program& program) {
 
 bool contains_bent_springs(const Program& program) {
   return std::any_of(program.link_runs.begin(), program.link_runs.end(), [](const LinkRun& run) {
-    return run.law != Law::spring && facts_of(run.law).contains_spring;
+    return !is_linear(run.law) && facts_of(run.law).contains_spring;
   });
 }
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <map>
 
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 
 namespace ressort::compile {
 namespace {

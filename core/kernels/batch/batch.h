@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/kernels/nodes.h"
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 
 namespace ressort::kernels {
 

@@ -1,5 +1,5 @@
 #include "core/kernels/batch/batch_form.h"
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 
 #include <algorithm>
 
@@ -9,7 +9,7 @@ namespace {
 // Stores the link in `batch` if it is a spring between masses in registers; returns whether it is.
 bool hold_spring(const Program& program, const LinkRun& run, Ends ends, Batch& batch) {
   const auto [a, b] = std::minmax(ends.a, ends.b);
-  if (run.law != Law::spring || a >= program.moving || a == b) {
+  if (!is_linear(run.law) || a >= program.moving || a == b) {
     return false;
   }
   const bool is_pair = b < program.moving;

@@ -6,7 +6,7 @@
 #include "core/kernels/chains/chains.h"
 #include "core/kernels/passive/clusters.h"
 #include "core/kernels/taps.h"
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 
 namespace ressort::kernels {
 namespace {
@@ -14,7 +14,7 @@ namespace {
 constexpr std::uint32_t none = 0xffffffffu;
 
 bool is_spring(const LinkRun& run) {
-  return run.law == Law::spring && run.scheme == Scheme::plain;
+  return is_linear(run.law) && run.scheme == Scheme::plain;
 }
 
 class ChainFinder {
@@ -361,7 +361,7 @@ Work work(const Program& program, const Chains& form, const Workload& load) {
         std::find_if(program.link_runs.begin(), program.link_runs.end(),
                      [&](const LinkRun& r) { return link >= r.first && link < r.first + r.count; });
     if (run->scheme == Scheme::plain) {
-      const bool is_cheap = run->law == Law::spring || run->law == Law::contact;
+      const bool is_cheap = is_linear(run->law) || facts_of(run->law).is_straight;
       work.add(is_cheap ? Item::chains_spring : Item::chains_link, voices);
     }
   }

@@ -10,7 +10,7 @@
 #include "core/kernels/grid/grid_places.h"
 #include "core/kernels/passive/clusters.h"
 #include "core/kernels/taps.h"
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 
 namespace ressort::kernels {
 namespace {
@@ -448,7 +448,7 @@ std::uint32_t largest_spring_run(const Program& program) {
   std::uint32_t largest = nowhere;
   for (std::uint32_t run = 0; run < program.link_runs.size(); ++run) {
     const LinkRun& links = program.link_runs[run];
-    if (links.law == Law::spring && links.scheme == Scheme::plain &&
+    if (is_linear(links.law) && links.scheme == Scheme::plain &&
         links.count >= least_regular_links &&
         (largest == nowhere || links.count > program.link_runs[largest].count)) {
       largest = run;
@@ -514,7 +514,7 @@ Work work(const Program& program, const Grid& form, const Workload& load) {
         .add(Item::grid_offset, packs * static_cast<double>(segment.offsets.size()));
   }
   for (const GridLinks& links : form.links) {
-    const bool is_spring = program.link_runs[links.run].law == Law::spring;
+    const bool is_spring = is_linear(program.link_runs[links.run].law);
     work.add(is_spring ? Item::grid_spring : Item::grid_link,
              voices * form.count / lanes * static_cast<double>(links.offsets.size()));
   }

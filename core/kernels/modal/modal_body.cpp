@@ -7,7 +7,7 @@
 
 #include "core/groups.h"
 #include "core/kernels/taps.h"
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 #include "core/linear_algebra/eigen.h"
 
 namespace ressort::kernels {
@@ -200,7 +200,7 @@ class BodyMaker {
       }
     }
     for (const LinkRun& run : program_.link_runs) {
-      for (std::uint32_t i = run.first; run.law == Law::spring && i < run.first + run.count; ++i) {
+      for (std::uint32_t i = run.first; is_linear(run.law) && i < run.first + run.count; ++i) {
         Bar bar = bar_between(program_.ends[i]);
         add_bar(body_.stiffness, run.coefficients[0], true, bar);
         bar.position = 0.0;
@@ -245,7 +245,7 @@ FeltForce force_felt(const Program& program, const LinearBody& body, std::uint32
   for (const LinkRun& run : program.link_runs) {
     std::vector<MassShare> shares;
     double constant = 0.0;
-    for (std::uint32_t i = run.first; run.law == Law::spring && i < run.first + run.count; ++i) {
+    for (std::uint32_t i = run.first; is_linear(run.law) && i < run.first + run.count; ++i) {
       const auto [a, b] = program.ends[i];
       const double share = share_felt(body, b, node) - share_felt(body, a, node);
       if (share == 0.0) {
@@ -297,7 +297,7 @@ std::uint32_t most_tied_masses(const Program& program) {
   }
   Groups tied(program.moving);
   for (const LinkRun& run : program.link_runs) {
-    for (std::uint32_t i = run.first; run.law == Law::spring && i < run.first + run.count; ++i) {
+    for (std::uint32_t i = run.first; is_linear(run.law) && i < run.first + run.count; ++i) {
       std::uint32_t first = nowhere;
       const auto tie = [&](std::uint32_t node) {
         if (node < program.moving) {

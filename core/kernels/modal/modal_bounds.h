@@ -10,7 +10,7 @@
 #include <limits>
 
 #include "core/kernels/modal/modal_sweep.h"
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 
 namespace ressort::kernels::RESSORT_ISA {
 namespace {
@@ -80,23 +80,20 @@ T norm_of_kicks(T sum, T length) {
 template <class T>
 bool may_act(const LinkRun& run, const T* coefficients, Range<T> d) {
   const auto c = [&](std::size_t i) { return coefficients[run.coefficients[i]]; };
-  return with_law_type(run.law, [&]<class Type>(Type) {
-    constexpr const LawFacts& law = Type::facts;
-    bool exerts = false;
-    for (std::size_t i = 0; i < law.count; ++i) {
-      exerts = exerts || (law.is_strength(i) && c(i) != 0);
-    }
-    if constexpr (law.lets_go()) {
-      const T reach = c(law.slot(Role::reach));
-      return exerts && d.high > -reach && (law.zone == Zone::below || reach > d.low);
-    } else {
-      return exerts;
-    }
-  });
+  const LawFacts& law = facts_of(run.law);
+  bool exerts = false;
+  for (std::size_t i = 0; i < law.count; ++i) {
+    exerts = exerts || (law.is_strength(i) && c(i) != 0);
+  }
+  if (!law.lets_go()) {
+    return exerts;
+  }
+  const T reach = c(law.slot(Role::reach));
+  return exerts && d.high > -reach && (law.zone == Zone::below || reach > d.low);
 }
 
 inline bool lets_go(Law law) {
-  return with_law_type(law, [](auto type) { return type.facts.lets_go(); });
+  return facts_of(law).lets_go();
 }
 
 // What is left of a link's force where its ends give way, as a spring in series with it does. For

@@ -4,7 +4,7 @@
 
 #include "core/kernels/modal/modal_form.h"
 #include "core/lanes.h"
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 
 namespace ressort::kernels {
 namespace {
@@ -59,10 +59,10 @@ void add_solving(const Program& program, double modes, double places, Work& work
   double sum = 0.0;
   for (const LinkRun& run : program.link_runs) {
     const LawFacts& law = facts_of(run.law);
-    const double each = links == 1.0                  ? 1.5 * law.solve_ns
-                        : law.is_straight             ? of_a_straight_link
-                        : law.family == Family::pluck ? 0.5 * of_a_link
-                                                      : of_a_link;
+    const double each = links == 1.0             ? 1.5 * law.solve_ns
+                        : law.is_straight        ? of_a_straight_link
+                        : law.zone == Zone::near ? 0.5 * of_a_link
+                                                 : of_a_link;
     sum += run.scheme == Scheme::plain ? 0.0 : run.count * each;
   }
   const double shoves = links > 0.0 && places > rows_of_a_sweep ? std::ceil(places / 4.0) : 0.0;

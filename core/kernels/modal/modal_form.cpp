@@ -9,7 +9,7 @@
 #include "core/kernels/modal/modal_body.h"
 #include "core/kernels/modal/modal_crossed.h"
 #include "core/kernels/modal/modal_worth.h"
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 #include "core/sampled_mode.h"
 
 namespace ressort::kernels {
@@ -259,7 +259,7 @@ class ModesFinder {
     }
     for (const LinkRun& run : program_.link_runs) {
       std::map<std::uint32_t, Vector> forces;  // [input] on the masses that it holds
-      for (std::uint32_t i = run.first; run.law == Law::spring && i < run.first + run.count; ++i) {
+      for (std::uint32_t i = run.first; is_linear(run.law) && i < run.first + run.count; ++i) {
         auto [a, b] = program_.ends[i];
         if (!body_.moves(a)) {
           std::swap(a, b);
@@ -282,7 +282,7 @@ class ModesFinder {
   void place_holds() {
     std::map<std::uint32_t, std::uint32_t> number;
     for (const LinkRun& run : program_.link_runs) {
-      if (run.law == Law::spring) {
+      if (is_linear(run.law)) {
         continue;
       }
       for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
@@ -302,7 +302,7 @@ class ModesFinder {
     for (std::uint32_t r = 0; r < program_.link_runs.size(); ++r) {
       const LinkRun& run = program_.link_runs[r];
       ModalHold hold{.run = r, .a = {}, .b = {}};
-      for (std::uint32_t i = run.first; run.law != Law::spring && i < run.first + run.count; ++i) {
+      for (std::uint32_t i = run.first; !is_linear(run.law) && i < run.first + run.count; ++i) {
         const auto [a, b] = program_.ends[i];
         if (body_.moves(a) || body_.moves(b) || has_force_output()) {
           hold.a.push_back(end_of(a));

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "core/groups.h"
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 
 namespace ressort::kernels {
 namespace {

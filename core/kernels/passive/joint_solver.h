@@ -159,7 +159,7 @@ class Joint {
       Joined<V>& link = joined_[i];
       link.before = state.before();
       link.speed = state.speed;
-      const bool rubs = facts_of(links_[i].law).family == Family::bow;
+      const bool rubs = facts_of(links_[i].law).is_friction;
       link.free = rubs ? state.speed + state.fast : state.free - state.before();
       const Steady<V> steady = laws_.steady(i, state);
       link.steady = select(is_first_, V{}, steady.force);

@@ -1,4 +1,4 @@
-// core/model: a network as a program in FAUST, to be compiled into plugins, phones and boards.
+// core/model: exports a network as a FAUST program.
 #pragma once
 
 #include <span>
@@ -11,20 +11,22 @@
 namespace ressort::model {
 
 struct FaustOptions {
-  std::string name;                           // of the model, for people
-  std::span<const ParameterSetting> sliders;  // one for each of Network::parameters, in their order
-  bool rescale = true;                        // numbers follow the sample rate, as in the engine
+  std::string name;                           // of the model
+  std::span<const ParameterSetting> sliders;  // [parameter]
+  bool rescale = true;  // coefficients follow the sample rate, as in the engine
+  std::span<const LawFacts> laws = law_table();  // by Law; tests export a law of their own
 };
 
-// A whole FAUST program without libraries, which computes what the engine computes, tick by tick:
-// process has a channel for each input and output up to the highest number in use, gaps included,
-// and a slider for each parameter that no input gives. Refuses a model without outputs, as FAUST
-// does, and of waveguides those that an input tunes, places that parameters move, and what holds
-// them too many at once or moved from the start. [any thread but audio]
+// Returns a complete FAUST program without libraries, which computes the engine's samples.
+// `process` has a channel for each input and output up to the highest number in use, and a slider
+// for each parameter that no input drives. Fails for a model without outputs, and for waveguides
+// that an audio input tunes, whose places move, or where two links move the same mass or place.
+// [any thread but audio]
 Result<std::string> faust_text(const Network& network, const FaustOptions& options);
 
-// Masses and links together, macros written out. FAUST's own time grows with the square and more:
-// ten seconds and half a gigabyte for this many, a minute for twice as many.
+// Returns the number of masses and links, with macros expanded. The FAUST compiler's time grows at
+// least with its square: it takes ten seconds and 0.5 GB for the number below, and a minute for
+// twice as many.
 std::size_t faust_elements(const Network& network);
 inline constexpr std::size_t comfortable_faust_elements = 2000;
 

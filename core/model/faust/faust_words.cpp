@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 
-#include "core/model/faust/faust_passive.h"
+#include "core/laws/law.h"
 #include "core/model/language/expression.h"
 
 namespace ressort::model {
@@ -16,115 +17,201 @@ bool is_word(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
 }
 
-// Comparisons only choose, here and in the laws: where FAUST has to compute with them, its types
-// take ten times as long to find.
-constexpr FaustDefinition helpers[] = {
-    {"swing",
-     "swing(m, k, z, x0, v0, f) = step ~ (_, _)\n"
-     "with {\n"
-     "  step(x, v) = before + now, now with {\n"
-     "    before = x + first(x0);\n"
-     "    speed = v + first(v0);\n"
-     "    now = speed + (f - spring(k, z, before, speed))/m;\n"
-     "  };\n"
-     "};\n"},
-    // M, K and Z of a body's mode as they are stepped (core/sampled_mode.h)
-    {"sampled",
-     "sampled(m, k, z) = mass, mass*(ring + out*(1.0 - ring)), mass*(lost + out*(1.0 - lost))\n"
-     "with {\n"
-     "  stiff = k/m*r*r;\n"
-     "  half = 0.5*z/m*r;\n"
-     "  square = stiff - half*half;\n"
-     "  root = 0.5*sqrt(abs(square));\n"
-     "  decay = exp(0.0 - half);\n"
-     "  sine = sin(root);\n"
-     "  creep = exp(root) - exp(0.0 - root);\n"
-     "  swing = select2(square > 0.0, 0.0 - 0.5*creep*creep, 2.0*sine*sine);\n"
-     "  ring = (1.0 - decay)*(1.0 - decay) + 2.0*decay*swing;\n"
-     "  lost = 1.0 - decay*decay;\n"
-     "  out = max(0.0, min(1.0, (square - 8.2)/1.6));\n"
-     "  mass = m*(1.0 + out*(stiff - 1.0));\n"
-     "};\n"},
-    // A waveguide's numbers (core/kernels/waveguides/design.h), at least so many samples long.
-    {"guide",
-     "guide(least, hz, t60, brightness) = samples, rate/f, allpass, pole, gain\n"
-     "with {\n"
-     "  rate = fconstant(int fSamplingFreq, <math.h>);\n"
-     "  f = max(15.0, min(hz, rate/(least + 1.5)));\n"
-     "  bright = max(0.0, min(1.0, brightness));\n"
-     "  turn = 6.283185307179586;\n"
-     "  theta = turn*f/rate;\n"
-     "  decay = 6.907755278982137/(max(t60, 3.0/f)*rate);\n"
-     "  loss = decay*rate/f;\n"
-     "  abs2(a, b) = a*a + b*b;\n"
-     "  over(a, b, x, y) = (a*x + b*y)/abs2(x, y), (b*x - a*y)/abs2(x, y);\n"
-     "  less(a, b, x, y) = a - x, b - y;\n"
-     "  // 1/z at the tone's pole z, and 1 - 1/z\n"
-     "  re = exp(decay)*cos(theta);\n"
-     "  im = 0.0 - exp(decay)*sin(theta);\n"
-     "  rise = 2.0*exp(decay)*sin(0.5*theta)*sin(0.5*theta) - (exp(decay) - 1.0);\n"
-     "  // ln of the loss's pole there, 1 - a being e^room\n"
-     "  size(room) = 0.0 - 0.5*log(abs2(1.0 + x*rise, x*im)) with { x = exp(0.0 - room) - 1.0; };\n"
-     "  angle(room) = atan2(x*im, 1.0 + x*rise) with { x = exp(0.0 - room) - 1.0; };\n"
-     "  delay(room) = (turn + angle(room))/theta;\n"
-     "  loud(room) = 0.0 - loss*bright + size(room) + decay*delay(room);\n"
-     "  half(i, low) = select2(loud(middle) > 0.0, middle, low) with { middle = low + "
-     "30.0/pow(2.0, i); };\n"
-     "  found = 0.0 - 60.0 : seq(i, 12, half(i)) : seq(i, 3, nearer);\n"
-     "  nearer(room) = room - loud(room)/(by_room(room) : _, *(decay/theta) : +);\n"
-     "  wants = (bright < 1.0) & (loud(0.0) > 0.0);\n"
-     "  fits = delay(found) >= least + 0.5;\n"
-     "  is_dark = wants & fits;\n"
-     "  first_room = select2(is_dark, 0.0, found);\n"
-     "  log_gain = 0.0 - loss*select2(wants & (delay(found) < least + 0.5), bright, 1.0);\n"
-     "  samples = max(least, floor(delay(first_room) - 0.500000001));\n"
-     "  rest = (delay(first_room) - samples)*theta;\n"
-     "  first_allpass = sin(0.5*(theta - rest))/sin(0.5*(theta + rest));\n"
-     "  // ln of the loop, and how it grows with both filters\n"
-     "  level(room, c) = log_gain + size(room) + 0.5*log(abs2(c + re, im)/abs2(1.0 + c*re, c*im)) "
-     "+\n"
-     "    samples*decay;\n"
-     "  phase(room, c) = remainder(angle(room) + atan2(im, c + re) - atan2(c*im, 1.0 + c*re) -\n"
-     "    samples*theta, turn);\n"
-     "  by_room(room) = over(rise, 0.0 - im, e + (1.0 - e)*rise, 0.0 - (1.0 - e)*im) with { e = "
-     "exp(room); };\n"
-     "  by_allpass(c) = over(1.0, 0.0, c + re, im), over(re, im, 1.0 + c*re, c*im) : less;\n"
-     "  newton(room, c) = level(room, c), phase(room, c), by_room(room), by_allpass(c) : step with "
-     "{\n"
-     "    step(x, y, a, b, c1, d) = room - (x*d - y*c1)/(a*d - b*c1), c - (a*y - b*x)/(a*d - "
-     "b*c1);\n"
-     "  };\n"
-     "  both = found, first_allpass : seq(i, 3, newton);\n"
-     "  dark_room = both : _, !;\n"
-     "  dark_allpass = both : !, _;\n"
-     "  is_solved = (dark_room <= 0.0) & (abs(dark_allpass) < 1.0);\n"
-     "  alone(c) = c - phase(0.0, c)/(by_allpass(c) : !, _);\n"
-     "  flat = first_allpass : seq(i, 3, alone);\n"
-     "  pole = select2(is_dark, 0.0, 1.0 - exp(select2(is_solved, found, dark_room)));\n"
-     "  allpass = select2(is_dark, flat, select2(is_solved, first_allpass, dark_allpass));\n"
-     "  gain = min(1.0, exp(log_gain - select2(is_dark, level(0.0, flat), 0.0)));\n"
-     "};\n"},
-    // Which sample of the loop is the nearest to a place (core/waveguide_places.h).
-    {"nearest",
-     "nearest(share, to_held, u, right, period) = whole(to_held*period) + "
-     "whole((away - to_held)*period)\n"
-     "with {\n"
-     "  whole(x) = select2(x < 0.0, floor(x + 0.5), ceil(x - 0.5));\n"
-     "  from_end = 0.5*(1.0 - max(1.0/period, min(1.0 - 1.0/period, u)));\n"
-     "  at = select2(right, from_end, 1.0 - from_end) - share;\n"
-     "  away = select2(at > 0.0, at + 1.0, at);\n"
-     "};\n"},
-    {"late", "late(most, n, x) = x @ int(max(0.0, min(most, n)));\n"},
-    {"filtered",
-     "filtered(c, a, g, x) = x*(1.0 - a) : + ~ *(a) : *(g) : straight\n"
-     "with {\n"
-     "  straight(y) = c*y + y' : + ~ *(0.0 - c);\n"
-     "};\n"},
-    {"hat", "hat(i, p) = max(0.0, 1.0 - abs(p - i));\n"},
-    {"along", "along(n, u) = (n - 1.0)*max(0.0, min(1.0, u));\n"},
+// FAUST definitions that are no laws. A comparison only ever selects here and in the laws' texts:
+// FAUST takes ten times as long to infer the types of a program that computes with comparisons.
+constexpr std::string_view helpers = R"(
+swing(m, k, z, x0, v0, f) = step ~ (_, _)
+with {
+  step(x, v) = before + now, now with {
+    before = x + first(x0);
+    speed = v + first(v0);
+    now = speed + (f - spring(k, z, before, speed))/m;
+  };
+};
+// M, K and Z of a body's mode, as they are stepped (core/sampled_mode.h).
+sampled(m, k, z) = mass, mass*(ring + out*(1.0 - ring)), mass*(lost + out*(1.0 - lost))
+with {
+  stiff = k/m*r*r;
+  half = 0.5*z/m*r;
+  square = stiff - half*half;
+  root = 0.5*sqrt(abs(square));
+  decay = exp(0.0 - half);
+  sine = sin(root);
+  creep = exp(root) - exp(0.0 - root);
+  swing = select2(square > 0.0, 0.0 - 0.5*creep*creep, 2.0*sine*sine);
+  ring = (1.0 - decay)*(1.0 - decay) + 2.0*decay*swing;
+  lost = 1.0 - decay*decay;
+  out = max(0.0, min(1.0, (square - 8.2)/1.6));
+  mass = m*(1.0 + out*(stiff - 1.0));
+};
+// The filters of a waveguide (core/kernels/waveguides/design.h) that is at least `least` samples
+// long.
+guide(least, hz, t60, brightness) = samples, rate/f, allpass, pole, gain
+with {
+  rate = fconstant(int fSamplingFreq, <math.h>);
+  f = max(15.0, min(hz, rate/(least + 1.5)));
+  bright = max(0.0, min(1.0, brightness));
+  turn = 6.283185307179586;
+  theta = turn*f/rate;
+  decay = 6.907755278982137/(max(t60, 3.0/f)*rate);
+  loss = decay*rate/f;
+  abs2(a, b) = a*a + b*b;
+  over(a, b, x, y) = (a*x + b*y)/abs2(x, y), (b*x - a*y)/abs2(x, y);
+  less(a, b, x, y) = a - x, b - y;
+  // 1/z at the tone's pole z, and 1 - 1/z
+  re = exp(decay)*cos(theta);
+  im = 0.0 - exp(decay)*sin(theta);
+  rise = 2.0*exp(decay)*sin(0.5*theta)*sin(0.5*theta) - (exp(decay) - 1.0);
+  // ln of the loss filter there, with the pole 1 - e^room
+  size(room) = 0.0 - 0.5*log(abs2(1.0 + x*rise, x*im)) with { x = exp(0.0 - room) - 1.0; };
+  angle(room) = atan2(x*im, 1.0 + x*rise) with { x = exp(0.0 - room) - 1.0; };
+  delay(room) = (turn + angle(room))/theta;
+  loud(room) = 0.0 - loss*bright + size(room) + decay*delay(room);
+  half(i, low) = select2(loud(middle) > 0.0, middle, low)
+  with {
+    middle = low + 30.0/pow(2.0, i);
+  };
+  found = 0.0 - 60.0 : seq(i, 12, half(i)) : seq(i, 3, nearer);
+  nearer(room) = room - loud(room)/(by_room(room) : _, *(decay/theta) : +);
+  wants = (bright < 1.0) & (loud(0.0) > 0.0);
+  fits = delay(found) >= least + 0.5;
+  is_dark = wants & fits;
+  first_room = select2(is_dark, 0.0, found);
+  log_gain = 0.0 - loss*select2(wants & (delay(found) < least + 0.5), bright, 1.0);
+  samples = max(least, floor(delay(first_room) - 0.500000001));
+  rest = (delay(first_room) - samples)*theta;
+  first_allpass = sin(0.5*(theta - rest))/sin(0.5*(theta + rest));
+  // ln of the whole loop, and its derivatives by both filters
+  level(room, c) = log_gain + size(room) +
+    0.5*log(abs2(c + re, im)/abs2(1.0 + c*re, c*im)) + samples*decay;
+  phase(room, c) = remainder(
+    angle(room) + atan2(im, c + re) - atan2(c*im, 1.0 + c*re) - samples*theta, turn);
+  by_room(room) = over(rise, 0.0 - im, e + (1.0 - e)*rise, 0.0 - (1.0 - e)*im)
+  with {
+    e = exp(room);
+  };
+  by_allpass(c) = over(1.0, 0.0, c + re, im), over(re, im, 1.0 + c*re, c*im) : less;
+  newton(room, c) = level(room, c), phase(room, c), by_room(room), by_allpass(c) : step
+  with {
+    step(x, y, a, b, c1, d) =
+      room - (x*d - y*c1)/(a*d - b*c1), c - (a*y - b*x)/(a*d - b*c1);
+  };
+  both = found, first_allpass : seq(i, 3, newton);
+  dark_room = both : _, !;
+  dark_allpass = both : !, _;
+  is_solved = (dark_room <= 0.0) & (abs(dark_allpass) < 1.0);
+  alone(c) = c - phase(0.0, c)/(by_allpass(c) : !, _);
+  flat = first_allpass : seq(i, 3, alone);
+  pole = select2(is_dark, 0.0, 1.0 - exp(select2(is_solved, found, dark_room)));
+  allpass = select2(is_dark, flat, select2(is_solved, first_allpass, dark_allpass));
+  gain = min(1.0, exp(log_gain - select2(is_dark, level(0.0, flat), 0.0)));
+};
+// The sample of the loop that is nearest to a place (core/waveguide_places.h).
+nearest(share, to_held, u, right, period) =
+  whole(to_held*period) + whole((away - to_held)*period)
+with {
+  whole(x) = select2(x < 0.0, floor(x + 0.5), ceil(x - 0.5));
+  from_end = 0.5*(1.0 - max(1.0/period, min(1.0 - 1.0/period, u)));
+  at = select2(right, from_end, 1.0 - from_end) - share;
+  away = select2(at > 0.0, at + 1.0, at);
+};
+late(most, n, x) = x @ int(max(0.0, min(most, n)));
+filtered(c, a, g, x) = x*(1.0 - a) : + ~ *(a) : *(g) : straight
+with {
+  straight(y) = c*y + y' : + ~ *(0.0 - c);
+};
+hat(i, p) = max(0.0, 1.0 - abs(p - i));
+along(n, u) = (n - 1.0)*max(0.0, min(1.0, u));
+// The force g(x) at the x that solves x + gamma g(x) = free between `far` and `free`: `count` steps
+// of Newton's method, with bisection where a step would leave the bracket or g falls too steeply.
+between(count, g, far, start, free, gamma) =
+  min(far, free), max(far, free), max(min(far, free), min(max(far, free), start)) :
+  seq(i, count, nearer) : !, !, _ : arrived
+with {
+  nearer(low, high, x) = g(x) : go with {
+    go(value, slope) = bottom, top, select2(fits, 0.5*(bottom + top), newton) with {
+      over = x - free + gamma*value;
+      steep = 1.0 + gamma*slope;
+      bottom = select2(over < 0.0, low, x);
+      top = select2(over < 0.0, x, high);
+      newton = x - over/steep;
+      fits = (newton >= bottom) & (newton <= top) & (steep > 0.0);
+    };
+  };
+  arrived(x) = g(x) : last with {
+    last(value, slope) = value - slope*(x - free + gamma*value)/(1.0 + gamma*slope);
+  };
+};
+// The same for a g that never falls, with a damper z.
+risen(g, z, way, gamma) =
+  between(24, both, way - gamma*(both(way) : _, !), way, way, gamma)
+with {
+  both(s) = g(s) : +(z*s), +(z);
+};
+// The discrete gradient of a potential between b and b + s, and its slope: e is the energy, f the
+// force, g the slope of the force. The force in the middle where b + s is too near to b.
+discrete(e, f, g, b, s) =
+  select2(is_near, quotient, f(b + 0.5*s)),
+  select2(is_near, (f(b + s) - quotient)/wide, 0.5*g(b + 0.5*s))
+with {
+  far = abs(b) + abs(b + s);
+  is_near = abs(s) <= max(0.000004*far, select2(far < 1e-150, 0.0, 1.0));
+  wide = select2(is_near, s, 1.0);
+  quotient = (e(b + s) - e(b))/wide;
+};
+// The force in the very first sample of a link that is under tension as it starts: its potential
+// must not rise above what it holds there.
+first_alone(g, before, speed, way, gamma) =
+  select2(abs(force)*gamma > abs(way), force, way/gamma)
+with {
+  falls = (g(before, speed) : _, !)*speed < 0.0;
+  lead = select2(falls, 0.0, speed);
+  force = between(48, risen_from, 0.0, way, way, gamma);
+  risen_from(s) = g(before + lead, s - lead) : gated with {
+    gated(value, slope) = select2(rises, 0.0, share), select2(rises, 0.0, bend) with {
+      w = s - lead;
+      rises = (value*w > 0.0) & (select2(falls, 1.0, w*speed) > 0.0);
+      wide = select2(falls & rises, 1.0, s);
+      share = select2(falls, value, value*w/wide);
+      bend = select2(falls, slope, (value + slope*w - share)/wide);
+    };
+  };
+};
+// The share of two samples for which a contact touches, by its depths before, now and after.
+inside(before, now, after) = 0.5*(share(before, now) + share(now, after))
+with {
+  share(a, b) = select2(a == b, (max(0.0, b) - max(0.0, a))/select2(a == b, b - a, 1.0),
+    select2(a > 0.0, 0.0, 1.0));
+};
+)";
+
+struct Definition {
+  std::string name;
+  std::string text;
 };
 
-// A formula on its way to text: what binds least in it.
+// Splits FAUST text into its definitions. Each one starts in the first column with its name and a
+// parenthesis, after its comment.
+void split_definitions(std::string_view text, std::vector<Definition>& definitions) {
+  std::string comment;
+  while (!text.empty()) {
+    const std::string_view line = text.substr(0, std::min(text.size(), text.find('\n') + 1));
+    text.remove_prefix(line.size());
+    const std::size_t name = std::min(
+        line.size(), static_cast<std::size_t>(std::find_if_not(line.begin(), line.end(), is_word) -
+                                              line.begin()));
+    if (line.starts_with("//")) {
+      comment += line;
+    } else if (name > 0 && name < line.size() && line[name] == '(') {
+      definitions.push_back({std::string(line.substr(0, name)), comment + std::string(line)});
+      comment.clear();
+    } else if (!definitions.empty()) {
+      definitions.back().text += line;
+    }
+  }
+}
+
+// A part of a formula, and the lowest precedence in its text.
 struct Term {
   std::string text;
   Tightness tightness = Tightness::atom;
@@ -204,7 +291,7 @@ std::string FaustNames::add(std::string_view label) {
 std::string faust_number(double number) {
   std::string text = print_number(number);
   if (text.find('.') == std::string::npos) {
-    text.insert(std::min(text.find('e'), text.size()), ".0");  // an integer is another type
+    text.insert(std::min(text.find('e'), text.size()), ".0");  // FAUST would read an integer
   }
   return text[0] == '-' ? "(" + text + ")" : text;
 }
@@ -219,6 +306,19 @@ std::string faust_formula(std::span<const Step> formula, std::span<const std::st
     stack.push_back(std::move(term));
   }
   return held(stack.back(), tightness);
+}
+
+std::string faust_scaled(const std::string& value, Unit unit) {
+  switch (unit) {
+    case Unit::stiffness:
+      return value + "*r*r";
+    case Unit::damping:
+    case Unit::friction:
+    case Unit::speed:
+      return value + "*r";
+    default:
+      return value;
+  }
 }
 
 std::string faust_sum(std::vector<std::string> terms) {
@@ -255,7 +355,7 @@ std::string flow(std::span<const std::string> words, std::string_view between, s
 
 std::string plain(std::string_view text) {
   std::string clean(text);
-  // Brackets, slashes and colons mean something in a slider's name.
+  // Brackets, slashes and colons have a meaning in a slider's name.
   std::replace_if(
       clean.begin(), clean.end(),
       [](char c) {
@@ -278,14 +378,31 @@ std::string faust_slider(const ParameterSetting& setting) {
   return text + ")";
 }
 
-std::string faust_laws(const std::set<std::string>& used) {
-  std::vector<FaustDefinition> definitions;
-  for (const LawFacts& law : law_table()) {
-    definitions.push_back({law.name, law.faust});
+std::string faust_laws(const std::set<std::string>& used, std::span<const LawFacts> laws) {
+  std::vector<Definition> definitions;
+  for (const LawFacts& law : laws) {
+    const std::string name(law.name);
+    std::string arguments;
+    for (std::size_t i = 1; i <= law.count; ++i) {
+      arguments += "p" + std::to_string(i) + ", ";
+    }
+    const std::string solved = arguments + "f, damping, b, speed, way, gamma)";
+    const std::string gradient = "gradient_" + name + "(" + arguments;
+    const std::size_t first = definitions.size();
+    split_definitions(law.faust, definitions);
+    if (std::none_of(definitions.begin() + static_cast<std::ptrdiff_t>(first), definitions.end(),
+                     [&](const Definition& one) { return one.name == "alone_" + name; })) {
+      definitions.push_back({"alone_" + name, "alone_" + name + "(" + solved + " =\n  f + risen(" +
+                                                  gradient +
+                                                  "b), damping, way - gamma*f, gamma);\n"});
+    }
+    definitions.push_back({"start_" + name, "start_" + name + "(" + solved +
+                                                " =\n  select2(1', first_alone(" +
+                                                gradient.substr(0, gradient.size() - 2) +
+                                                "), b, speed, way, gamma),\n  alone_" + name + "(" +
+                                                solved + ");\n"});
   }
-  definitions.insert(definitions.end(), std::begin(helpers), std::end(helpers));
-  const auto passive = faust_passive_definitions();
-  definitions.insert(definitions.end(), passive.begin(), passive.end());
+  split_definitions(helpers, definitions);
   const auto calls = [](std::string_view text, std::string_view name) {
     for (std::size_t at = text.find(name); at != text.npos; at = text.find(name, at + 1)) {
       const std::size_t end = at + name.size();
@@ -308,7 +425,7 @@ std::string faust_laws(const std::set<std::string>& used) {
     }
   };
   for (std::size_t i = 0; i < definitions.size(); ++i) {
-    if (used.contains(std::string(definitions[i].name))) {
+    if (used.contains(definitions[i].name)) {
       use(use, i);
     }
   }
@@ -322,9 +439,9 @@ std::string faust_laws(const std::set<std::string>& used) {
 std::string faust_prelude(bool rescale) {
   const std::string rate = rescale ? "44100.0/fconstant(int fSamplingFreq, <math.h>);  // numbers "
                                      "are per sample at 44100 Hz\n"
-                                   : "1.0;  // numbers are per sample, at whatever rate\n";
+                                   : "1.0;  // numbers are per sample, at any rate\n";
   return "r = " + rate +
-         "first(a) = a*(1 - 1');  // at the first tick only\n"
+         "first(a) = a*(1 - 1');  // in the first sample only\n"
          "was(start, x) = x' + first(start);\n"
          "travel(start, v) = v + first(start) : + ~ _;\n"
          "push(f) = f*r*r;\n";

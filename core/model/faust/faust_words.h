@@ -1,5 +1,4 @@
-// core/model: the words of FAUST: numbers, names, sums, formulas, and the laws as definitions. All
-// pure text, for faust.cpp.
+// core/model: prints names, numbers, sums, formulas and definitions in FAUST, for faust.cpp.
 #pragma once
 
 #include <set>
@@ -9,13 +8,14 @@
 #include <vector>
 
 #include "core/formula.h"
+#include "core/laws/law.h"
 #include "core/model/network.h"
 #include "core/model/preset/preset.h"
 
 namespace ressort::model {
 
-// Turns labels into different FAUST identifiers, to be used after a prefix: so no label is a
-// keyword, a primitive or a name of ours.
+// Converts labels to unique FAUST identifiers. A prefix before each of them avoids clashes with
+// keywords, primitives and our own names.
 class FaustNames {
  public:
   std::string add(std::string_view label);
@@ -24,33 +24,36 @@ class FaustNames {
   std::set<std::string> taken_;
 };
 
-// A real number; a negative one in parentheses.
+// Prints a real number; a negative one in parentheses.
 std::string faust_number(double number);
 
-// How tightly a formula's text must hold together where it is put.
+// The lowest precedence that the surrounding text accepts without parentheses.
 enum class Tightness { sum, product, atom };
 
-// The formula with `parameters` as the names of its parameters.
+// Prints a formula; `parameters` are the names of its parameters.
 std::string faust_formula(std::span<const Step> formula, std::span<const std::string> parameters,
                           Tightness tightness = Tightness::sum);
 
-// Terms that each start with "+ " or "- "; "0.0" for none.
+// Converts the text of a coefficient to the sample rate of the program.
+std::string faust_scaled(const std::string& value, Unit unit);
+
+// Prints a sum of terms that each start with "+ " or "- "; "0.0" for none.
 std::string faust_sum(std::vector<std::string> terms);
 
-// Words with `between`, broken into lines that start with `indent` blanks.
+// Joins words with `between`, and breaks lines, which start with `indent` blanks.
 std::string flow(std::span<const std::string> words, std::string_view between, std::size_t indent);
 
-// Fit for a comment and for a string.
+// Replaces the characters that a comment or a string must not contain.
 std::string plain(std::string_view text);
 
-// The slider; a number where the setting leaves it no range.
+// Prints a slider, or a number if the setting has no range.
 std::string faust_slider(const ParameterSetting& setting);
 
-// What a program holds only if it uses it: the laws, how a driven mass moves, what waveguides need.
-// Of those that are used by name, and of what they stand on.
-std::string faust_laws(const std::set<std::string>& used);
+// Returns the definitions of these names, and of all names that they use: laws, driven masses,
+// waveguides.
+std::string faust_laws(const std::set<std::string>& used, std::span<const LawFacts> laws);
 
-// What every program starts with.
+// Returns the definitions that every program starts with.
 std::string faust_prelude(bool rescale);
 
 }  // namespace ressort::model

@@ -1,10 +1,10 @@
-// What each element's line becomes.
+// Reads the lines of masses, links, inputs and outputs.
 #include <algorithm>
 #include <cctype>
 #include <charconv>
 #include <cmath>
 
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 #include "core/model/language/expression.h"
 #include "core/model/language/reader.h"
 #include "core/model/topology.h"
@@ -12,13 +12,13 @@
 namespace ressort::model {
 namespace {
 
-constexpr double least_mass = 1e-300;  // a smaller one has no finite inverse
+constexpr double least_mass = 1e-300;  // the inverse of a smaller mass is not finite
 
 }  // namespace
 
 void Reader::add_mass(const Line& line) {
   if (line.element == undeclared) {
-    return;  // the label is another element's; it has been told
+    return;  // another element has this label; reported there
   }
   Mass& mass = out_.network.masses[line.element];
   mass.name = std::string(line.label.text);
@@ -62,7 +62,7 @@ void Reader::add_mass(const Line& line) {
   }
 }
 
-// MIMS writes gravity by a keyword of its own, MIMS4Max by one argument more.
+// Reads a gravity. MIMS has a keyword for it, MIMS4Max an additional argument.
 void Reader::read_gravity(const Line& line, Mass& mass, std::size_t& at) {
   const bool by_keyword = line.keyword->word == "massG";
   const auto most = static_cast<std::size_t>(line.keyword->most);
@@ -76,7 +76,7 @@ void Reader::read_gravity(const Line& line, Mass& mass, std::size_t& at) {
   }
 }
 
-// A number that is to be a mass; one that a parameter gives is looked at where it is played.
+// Reports a mass that is not above 0. If a parameter sets it, the compiler checks it.
 void Reader::check_mass(const Line& line, std::size_t at, ArgumentId mass) {
   if (mass != no_argument && is_constant(out_.network.arguments[mass]) &&
       !(argument_value(out_.network, mass, {}) > least_mass)) {
@@ -95,7 +95,7 @@ void Reader::add_link(Line& line) {
     const std::size_t slot = static_cast<std::size_t>(line.keyword->link->first) + i - 2;
     link.arguments[slot] = argument(line, i);
   }
-  if (link.law == Law::bow) {
+  if (line.keyword->word == "nlBow") {
     choose_profile(link);
   }
   show_dialect(line);
@@ -110,7 +110,7 @@ void Reader::add_link(Line& line) {
   out_.network.links.push_back(std::move(link));
 }
 
-// A bow whose profile is a number has no choice left.
+// Chooses the law of a bow whose profile is a constant.
 void Reader::choose_profile(Link& link) const {
   ArgumentId& profile = link.arguments[2];
   if (profile == no_argument) {
@@ -118,14 +118,14 @@ void Reader::choose_profile(Link& link) const {
   }
   const Formula& formula = out_.network.arguments[profile];
   if (!is_constant(formula)) {
-    link.law = Law::either_bow;
+    link.law = law_named("either_bow");
     return;
   }
-  link.law = evaluate(formula, {}) > 0.0 ? Law::smooth_bow : Law::bow;
+  link.law = law_named(evaluate(formula, {}) > 0.0 ? "smooth_bow" : "bow");
   profile = no_argument;
 }
 
-// MIMS4Max alone has some of the laws, and counts of arguments of its own.
+// Notes a law, or a number of arguments, that only MIMS4Max has.
 void Reader::show_dialect(const Line& line) {
   const LawWord& word = *line.keyword->link;
   const auto count = static_cast<int>(line.rest.size()) - line.keyword->references;
@@ -174,7 +174,7 @@ void Reader::add_output(Line& line) {
   }
 }
 
-// The N of the argument "@inN".
+// Returns the N of the argument "@inN".
 int Reader::audio_input(const Line& line) {
   Line asked = line;
   asked.label = line.rest[0];
@@ -188,15 +188,15 @@ std::uint32_t Reader::drawing(const Line& line, std::size_t at) {
   if (line.rest.size() < at + 3) {
     return 0;
   }
-  show(delayed_, line, "names a drawing behind its arguments");
+  show(delayed_, line, "names a drawing after its arguments");
   Drawing drawing{
       .group = std::string(line.rest[at].text), .x = state(line, at + 1), .y = state(line, at + 2)};
   out_.network.drawings.push_back(std::move(drawing));
   return static_cast<std::uint32_t>(out_.network.drawings.size());
 }
 
-// The text with the '/' that one editor deletes put back: "sqrt(kScale3)" is "sqrt(kScale/3)" where
-// kScale is a parameter and kScale3 is none. Empty where there is nothing to put back.
+// Restores a '/' that one editor deletes: "sqrt(kScale3)" becomes "sqrt(kScale/3)" if kScale is a
+// parameter and kScale3 is not. Returns "" if there is nothing to restore.
 std::string Reader::with_slash(std::string_view text) const {
   std::size_t at = 0;
   while (at < text.size()) {
@@ -244,9 +244,9 @@ ArgumentId Reader::expression(const Line& line, const Token& token) {
       const std::string repaired = with_slash(token.text);
       parsed = repaired.empty() ? std::move(parsed) : parse_expression(repaired, parameter_names_);
       if (parsed) {
-        warning(
-            line, token,
-            "a '/' is missing, as MIMS4Max loses the first of a file; read as " + quoted(repaired));
+        warning(line, token,
+                "a '/' is missing (MIMS4Max drops the first one of a file); read as " +
+                    quoted(repaired));
       }
     }
     if (!parsed) {
@@ -261,7 +261,7 @@ ArgumentId Reader::expression(const Line& line, const Token& token) {
     formula = *std::move(parsed);
   }
   if (is_constant(formula) && !std::isfinite(evaluate(formula, {}))) {
-    error(line, token, quoted(token.text) + " is no finite number");
+    error(line, token, quoted(token.text) + " is not a finite number");
     return no_argument;
   }
   const auto id = static_cast<ArgumentId>(out_.network.arguments.size());
@@ -270,20 +270,21 @@ ArgumentId Reader::expression(const Line& line, const Token& token) {
   return id;
 }
 
-// A scalar, or [x y z] of which z swings and x and y are for drawing; true if there was an x and y.
+// Reads a scalar, or [x y z], where z is the position and x and y are for drawing. Returns true if
+// the text has x and y.
 bool Reader::position(const Line& line, std::size_t at, double& z, double& x, double& y) {
   const Token& token = line.rest[at];
   if (token.text[0] != '[') {
     z = state(line, at);
     return false;
   }
-  show(velocity_, line, "writes a place as [x y z]");
+  show(velocity_, line, "writes a position as [x y z]");
   const Token inner = unwrapped(token);
   split(inner.text, parts_);
   double* const targets[] = {&x, &y, &z};
   if (parts_.size() != 3) {
     error(line, token,
-          "a place is one number or three, [x y z]; found " + std::to_string(parts_.size()));
+          "a position is one number or three, [x y z]; found " + std::to_string(parts_.size()));
     return false;
   }
   for (std::size_t i = 0; i < 3; ++i) {
@@ -300,9 +301,9 @@ double Reader::state(const Line& line, std::size_t at) {
   if (!parse_number(line.rest[at].text, number)) {
     error(line, line.rest[at],
           "found " + quoted(line.rest[at].text) + " where a number was expected" +
-              (is_identifier(line.rest[at].text) ? " (a starting state is no parameter)"
+              (is_identifier(line.rest[at].text) ? " (a state at the start cannot be a parameter)"
                : line.keyword->element == Element::position_input && line.rest[at].text[0] == '@'
-                   ? "; a force on it is a 'frcInput'"
+                   ? "; use 'frcInput' for a force"
                    : ""));
   }
   return number;
@@ -354,13 +355,12 @@ std::optional<std::uint32_t> Reader::reference(Line& line, std::size_t at) {
   }
   error(line, token,
         entry_of(name) != IndexTable::none
-            ? quoted(token.text) + " is no mass, so nothing can be attached to it"
+            ? quoted(token.text) + " is not a mass, so nothing can be attached to it"
             : "no mass is called " + quoted(token.text) + suggestion(name, names, "@"));
   return std::nullopt;
 }
 
-// A place on a macro: one coordinate on a string, which may be written with blanks in it, two on a
-// mesh.
+// Reads a place on a macro: one coordinate on a string, which may contain blanks, or two on a mesh.
 std::optional<std::uint32_t> Reader::tap(const Line& line, const Token& token, const Token& label,
                                          std::vector<Token> coordinates) {
   const auto macro = macro_of(label.text.substr(1));
@@ -373,7 +373,7 @@ std::optional<std::uint32_t> Reader::tap(const Line& line, const Token& token, c
     }
     error(line, label,
           mass_of(label.text.substr(1))
-              ? quoted(label.text) + " is one mass, so it has no places on it: write it without '['"
+              ? quoted(label.text) + " is a single mass, not a macro: write it without '['"
               : "no macro is called " + quoted(label.text) +
                     suggestion(label.text.substr(1), names, "@"));
     return std::nullopt;
@@ -405,7 +405,7 @@ std::optional<std::uint32_t> Reader::tap(const Line& line, const Token& token, c
     double number = 0.0;
     if (parse_number(coordinate.text, number) && (number < 0.0 || number > 1.0)) {
       warning(line, coordinate,
-              "a place on a macro goes from 0 to 1; " + quoted(coordinate.text) + " is taken as " +
+              "a place on a macro goes from 0 to 1; " + quoted(coordinate.text) + " is read as " +
                   (number < 0.0 ? "0" : "1"));
     }
   }
@@ -415,7 +415,7 @@ std::optional<std::uint32_t> Reader::tap(const Line& line, const Token& token, c
                     .v = is_plane ? expression(line, coordinates[1]) : no_argument});
 }
 
-// By the name of a place, or of a parameter that moves along them.
+// Reads a place on a body by its name, or by a parameter that moves along the places.
 std::optional<std::uint32_t> Reader::named_place(const Line& line, const Token& token,
                                                  std::uint32_t macro, const Token& name) {
   Network& network = out_.network;
@@ -459,7 +459,7 @@ std::optional<int> Reader::channel(const Line& line, std::string_view prefix) {
     const char* end = label.data() + label.size();
     const auto [last, failure] = std::from_chars(label.data() + prefix.size(), end, number);
     if (failure == std::errc{} && last == end && number >= 1 && number <= max_channels &&
-        label.substr(prefix.size()) == std::to_string(number)) {  // not "in01" beside "in1"
+        label.substr(prefix.size()) == std::to_string(number)) {  // rejects "in01"
       return number;
     }
   }

@@ -27,8 +27,8 @@ bool is_letter(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_';
 }
 
-// The number that `text` starts with, infinite where it is out of a double's range; `length` is 0
-// where it starts with none.
+// Returns the number that `text` starts with, or infinity if it is out of a double's range. Sets
+// `length` to 0 if the text does not start with a number.
 double leading_number(std::string_view text, std::size_t& length) {
   double number = 0.0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
@@ -38,7 +38,7 @@ double leading_number(std::string_view text, std::size_t& length) {
   return error == std::errc{} ? number : HUGE_VAL;
 }
 
-// Recursive descent; every rule writes its steps and tracks how deep the stack would be.
+// A recursive-descent parser that writes postfix steps and tracks the depth of their stack.
 class Parser {
  public:
   Parser(std::string_view text, std::span<const std::string> parameters)
@@ -98,7 +98,7 @@ class Parser {
     }
     primary();
     if (negative && !failed_) {
-      // A negated number stays one number, so that "-0.2" prints back as it was read.
+      // A negated number becomes one number, so that "-0.2" is printed as it was read.
       if (formula_.back().op == Op::number) {
         formula_.back().value = -formula_.back().value;
       } else {
@@ -161,7 +161,7 @@ class Parser {
       }
     }
     at_ = start;
-    fail(quoted(word) + " is no parameter of this model");
+    fail(quoted(word) + " is not a parameter of this model");
   }
 
   void call(std::string_view word, std::size_t start) {
@@ -187,7 +187,8 @@ class Parser {
       return push({function.op, 0, 0.0}, 1 - arguments);
     }
     at_ = start;
-    fail("unknown function " + quoted(word) + "; there are sqrt abs sin cos exp pow min max clamp");
+    fail("unknown function " + quoted(word) +
+         "; known functions: sqrt abs sin cos exp pow min max clamp");
   }
 
   void push_operator(Op op) { push({op, 0, 0.0}, -1); }
@@ -218,7 +219,7 @@ class Parser {
     }
   }
 
-  // Where the text is read.
+  // Returns the character at the current position, quoted.
   std::string letter() const {
     std::size_t length = 0;
     return quoted(first_letter(text_.substr(at_), length));
@@ -241,7 +242,7 @@ class Parser {
   Formula formula_;
 };
 
-// How tightly the outermost operator of a text holds.
+// Precedence of the outermost operator of a text, lowest first.
 enum class Binding { sum, product, sign, primary };
 
 struct Piece {
@@ -254,7 +255,8 @@ std::string held(const Piece& piece, Binding least) {
 }
 
 Piece infix(const Piece& left, char sign, const Piece& right, Binding binding) {
-  // An operator to the right with the same binding would be done first, on the left it is anyway.
+  // Operators associate to the left, so only the right operand needs parentheses at equal
+  // precedence.
   const auto tighter = static_cast<Binding>(static_cast<int>(binding) + 1);
   return {held(left, binding) + sign + held(right, tighter), binding};
 }
@@ -312,7 +314,8 @@ bool parse_number(std::string_view text, double& number) {
 }
 
 std::string print_number(double number) {
-  // Of the two shortest forms, 0.0005 is easier on the eye than 5e-04, and 1e-20 than its zeros.
+  // Chooses between the two shortest forms: 0.0005 reads better than 5e-04, and 1e-20 than its
+  // zeros.
   const double size = std::fabs(number);
   const bool is_usual = number == 0.0 || (size >= 1e-7 && size < 1e15);
   char text[32];
@@ -320,7 +323,7 @@ std::string print_number(double number) {
       std::to_chars(text, text + sizeof text, number,
                     is_usual ? std::chars_format::fixed : std::chars_format::scientific);
   std::string printed = error == std::errc{} ? std::string(text, end) : std::string("0");
-  std::erase(printed, '+');  // an exponent needs none, and MIMS4Max divides arguments at it
+  std::erase(printed, '+');  // MIMS4Max splits arguments at a '+', and an exponent needs none
   return printed;
 }
 

@@ -38,7 +38,7 @@ std::vector<Keyword> all_keywords() {
   std::vector<Keyword> all(std::begin(fixed), std::end(fixed));
   for (std::size_t law = 0; law < law_table().size(); ++law) {
     for (const LawWord& word : law_table()[law].words) {
-      // Several laws may share a word; it is read as the first of them.
+      // Several laws may share a word; the reader takes the first of them.
       const bool is_known = std::any_of(
           all.begin(), all.end(), [&](const Keyword& known) { return known.word == word.word; });
       if (!word.word.empty() && !is_known) {

@@ -1,4 +1,4 @@
-// core/model: the words of the .mdl language.
+// core/model: the keywords of the .mdl language.
 #pragma once
 
 #include <span>
@@ -33,22 +33,21 @@ inline bool is_parameter(Element element) {
 
 inline constexpr int most_body_places = 256;
 
-// Everything that tells one keyword from another. The reader, its messages and its suggestions
-// have no other list.
+// The description of a keyword. The reader, its messages and its suggestions use this list only.
 struct Keyword {
   std::string_view word;
   Element element;
-  int references;              // of masses, before the arguments
-  int least;                   // arguments
-  int most;                    // arguments, without a drawing
+  int references;              // number of masses before the arguments
+  int least;                   // fewest arguments
+  int most;                    // most arguments, without a drawing
   bool drawable;               // may be followed by GROUP X Y
-  std::string_view arguments;  // as a person writes them
+  std::string_view arguments;  // for messages
   MacroKind macro{};           // of Element::macro
   Law law{};                   // of Element::link
   const LawWord* link{};       // of Element::link
 };
 
-// All words of the language, those of links from their laws. [any thread]
+// Returns all keywords, including those of the laws. [any thread]
 std::span<const Keyword> keywords();
 
 }  // namespace ressort::model

@@ -1,4 +1,4 @@
-// What the line of a macro becomes: masses in rows, bodies and waveguides.
+// Reads the lines of macros: strings, meshes, bodies with their modes, and waveguides.
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -11,7 +11,7 @@ namespace ressort::model {
 
 void Reader::add_macro(const Line& line) {
   if (line.element == undeclared) {
-    return;  // the label is another element's; it has been told
+    return;  // another element has this label; reported there
   }
   Macro& macro = out_.network.macros[line.element];
   macro.name = std::string(line.label.text);
@@ -30,7 +30,7 @@ void Reader::add_macro(const Line& line) {
   if (nodes_ > most_nodes_) {
     macro.length = macro.width = 2;
     error(line, line.rest[0],
-          "the macros have more than " + std::to_string(most_nodes_) + " nodes together");
+          "the macros have more than " + std::to_string(most_nodes_) + " nodes in all");
   }
   macro.mass = argument(line, at);
   check_mass(line, at++, macro.mass);
@@ -50,7 +50,7 @@ void Reader::add_macro(const Line& line) {
     resting_.push_back(line.element);
   } else {
     show(velocity_, line, "gives a macro a motion");
-    double far_x = 0.0;  // the drawn line's other end
+    double far_x = 0.0;  // of the other end, for drawing
     double far_y = 0.0;
     is_placed |= position(line, at++, macro.third, far_x, far_y);
   }
@@ -61,7 +61,7 @@ void Reader::add_macro(const Line& line) {
 }
 
 void Reader::add_waveguide(const Line& line, Macro& guide) {
-  guide.length = 0;  // it has no nodes
+  guide.length = 0;  // no nodes
   guide.impedance = positive(line, 0, "a waveguide's impedance R");
   guide.frequency_hz = positive(line, 1, "a waveguide's frequency in Hz");
   guide.t60_s = positive(line, 2, "a waveguide's T60 in seconds");
@@ -82,20 +82,20 @@ void Reader::add_waveguide(const Line& line, Macro& guide) {
   }
 }
 
-// A body's places are known before any line that may name them is read.
+// Reads the names of a body's places, before any line that refers to them.
 void Reader::name_places(const Line& line, Macro& body) {
   body.kind = line.keyword->macro;
   if (body.kind != MacroKind::body) {
     return;
   }
-  body.length = 0;  // its modes are counted as they come
+  body.length = 0;  // add_mode counts the modes
   for (std::size_t i = 1; i < line.rest.size(); ++i) {
     const Token& place = line.rest[i];
     if (!is_identifier(place.text)) {
       error(line, place,
             quoted(place.text) +
-                " is no name of a place: it has letters, digits and '_' only, "
-                "and starts with no digit");
+                " is not a name for a place: use letters, digits and '_', and do not "
+                "start with a digit");
     } else if (std::find(body.places.begin(), body.places.end(), place.text) != body.places.end()) {
       error(line, place, "the body has two places called " + quoted(place.text));
     }
@@ -139,11 +139,11 @@ void Reader::add_mode(const Line& line) {
     return error(line, line.rest[std::min(line.rest.size() - 1, 3 + body.places.size())],
                  "the body " + quoted(label.text) + " has " + std::to_string(body.places.size()) +
                      (body.places.size() == 1 ? " place (" : " places (") + places +
-                     "), so a mode has as many displacements; found " + std::to_string(given));
+                     "), so a mode needs as many displacements; found " + std::to_string(given));
   }
   if (++nodes_ > most_nodes_) {
     return error(line, line.label,
-                 "the macros have more than " + std::to_string(most_nodes_) + " nodes together");
+                 "the macros have more than " + std::to_string(most_nodes_) + " nodes in all");
   }
   BodyMode mode{.name = std::string(line.label.text), .macro = *index};
   mode.location = {line.number, line.label.column};
@@ -156,7 +156,8 @@ void Reader::add_mode(const Line& line) {
   out_.network.modes.push_back(std::move(mode));
 }
 
-// An argument that must be above 0; one that a parameter gives is looked at where it is played.
+// Reads an argument and reports a constant that is not above 0. If a parameter sets it, the
+// compiler checks it.
 ArgumentId Reader::positive(const Line& line, std::size_t at, const std::string& what) {
   const ArgumentId id = argument(line, at);
   if (id != no_argument && is_constant(out_.network.arguments[id]) &&
@@ -166,7 +167,7 @@ ArgumentId Reader::positive(const Line& line, std::size_t at, const std::string&
   return id;
 }
 
-// A number, as it is or as an expression without parameters.
+// Reads a number or an expression without parameters.
 double Reader::displacement(const Line& line, std::size_t at) {
   const Token token = unwrapped(line.rest[at]);
   double number = 0.0;
@@ -183,7 +184,7 @@ double Reader::displacement(const Line& line, std::size_t at) {
   return 0.0;
 }
 
-// The coordinate of a place by its name.
+// Returns the coordinate of a named place.
 std::optional<double> Reader::place_called(const Macro& body, const Token& token) const {
   const auto place = std::find(body.places.begin(), body.places.end(), token.text);
   if (place == body.places.end()) {
@@ -193,7 +194,7 @@ std::optional<double> Reader::place_called(const Macro& body, const Token& token
   return static_cast<double>(place - body.places.begin()) / last;
 }
 
-// A count of nodes: no parameter, and no more than there may be in all.
+// Reads a constant number of nodes.
 std::uint32_t Reader::size(const Line& line, std::size_t at, std::uint32_t least) {
   const std::string_view text = line.rest[at].text;
   std::uint64_t number = 0;

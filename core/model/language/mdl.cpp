@@ -11,13 +11,13 @@ namespace ressort::model {
 
 ParsedNetwork Reader::read(std::string_view text, const ReadOptions& options) {
   if (text.size() > max_model_bytes) {
-    say(Severity::error, 1, {"", 1},
-        "the model is longer than the " + std::to_string(max_model_bytes >> 20) +
-            " MiB that are read");
+    report(
+        Severity::error, 1, {"", 1},
+        "the model is longer than the limit of " + std::to_string(max_model_bytes >> 20) + " MiB");
     return std::move(out_);
   }
   if (text.starts_with("\xef\xbb\xbf")) {
-    text.remove_prefix(3);  // the mark that some editors put before UTF-8
+    text.remove_prefix(3);  // the byte order mark
   }
   const std::size_t zero = text.find('\0');
   if (zero != std::string_view::npos) {
@@ -29,8 +29,8 @@ ParsedNetwork Reader::read(std::string_view text, const ReadOptions& options) {
         start = i + 1;
       }
     }
-    say(Severity::error, line, {"", static_cast<int>(zero - start) + 1},
-        "found a zero byte: this is no text, so it is no model");
+    report(Severity::error, line, {"", static_cast<int>(zero - start) + 1},
+           "found a zero byte: this is a binary file, not a model");
     return std::move(out_);
   }
   const Progress& progress = options.progress;
@@ -38,7 +38,7 @@ ParsedNetwork Reader::read(std::string_view text, const ReadOptions& options) {
   progress.stage("reading it");
   text_ = text;
   int number = 0;
-  while (!text.empty() && errors_ <= most_diagnostics) {
+  while (!text.empty() && !count_.is_full()) {
     const auto* const last =
         std::find_if(text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r'; });
     const auto end = static_cast<std::size_t>(last - text.begin());
@@ -49,11 +49,11 @@ ParsedNetwork Reader::read(std::string_view text, const ReadOptions& options) {
     const bool pair = end + 1 < text.size() && text[end] == '\r' && text[end + 1] == '\n';
     text.remove_prefix(std::min(text.size(), end + (pair ? 2 : 1)));
   }
-  // Declarations first: a line may refer to one that comes after it.
+  // Declarations come first because a line may refer to a later one.
   declare_all();
   progress.spend(entries_.size());
   for (const Entry& entry : entries_) {
-    if (errors_ > most_diagnostics) {
+    if (count_.is_full()) {
       break;
     }
     Line line = open(entry);
@@ -61,13 +61,13 @@ ParsedNetwork Reader::read(std::string_view text, const ReadOptions& options) {
     progress.spend(20);
   }
   if (entries_.empty() && out_.ok()) {
-    say(Severity::error, 1, {"", 1},
-        "the model is empty: expected elements such as '@m mass 1. 0. 0.'");
+    report(Severity::error, 1, {"", 1},
+           "the model is empty: expected elements such as '@m mass 1. 0. 0.'");
   }
   progress.spend(8 * entries_.size());
   decide_motion(options);
   progress.spend(8 * entries_.size());
-  look_over();
+  warn_of_mistakes();
   progress.spend(8 * entries_.size());
   std::stable_sort(out_.diagnostics.begin(), out_.diagnostics.end(),
                    [](const Diagnostic& a, const Diagnostic& b) { return a.line < b.line; });
@@ -101,8 +101,9 @@ void Reader::read_line(std::string_view text, int number) {
       std::any_of(line.label.text.begin(), line.label.text.end(),
                   [](char c) { return std::iscntrl(static_cast<unsigned char>(c)) != 0; })) {
     return error(line, line.label,
-                 quoted(line.label.text) + " is no label: it is longer than " +
-                     std::to_string(longest_label) + " bytes, or has what cannot be printed");
+                 quoted(line.label.text) + " is not a label: it is longer than " +
+                     std::to_string(longest_label) +
+                     " bytes or has characters that cannot be printed");
   }
   if (tokens_.size() < 2) {
     return error(line, {"", line.label.column + static_cast<int>(line.label.text.size()) + 1},
@@ -125,7 +126,7 @@ void Reader::read_line(std::string_view text, int number) {
                       .keyword = static_cast<std::uint8_t>(found - keywords().begin())});
 }
 
-// The line, until the next one is opened.
+// Splits a line again. The result is valid until the next call.
 Line Reader::open(const Entry& entry) {
   split(text_.substr(entry.at, entry.length), tokens_);
   Line line{.number = entry.number,
@@ -144,7 +145,7 @@ std::string_view Reader::label_of(const Entry& entry) const {
   return first_word(text.substr(text.find('@') + 1));
 }
 
-// The entry of the label, or where it is to be entered.
+// Returns the label's slot in the table.
 std::uint32_t& Reader::entry_of(std::string_view label) {
   return labels_.find(std::hash<std::string_view>()(label),
                       [&](std::uint32_t entry) { return label_of(entries_[entry]) == label; });
@@ -164,8 +165,8 @@ std::optional<std::uint32_t> Reader::macro_of(std::string_view label) {
              : std::nullopt;
 }
 
-// ~motion MEANING, or ~begin NAME and ~end NAME: what is declared between them is drawn in the
-// group NAME.
+// Reads `~motion MEANING`, or `~begin NAME` and `~end NAME`. Elements declared between these two
+// are drawn in the group NAME.
 void Reader::read_block(const std::vector<Token>& tokens, int number) {
   const Line line{.number = number, .label = tokens[0]};
   if (tokens[0].text == "~motion") {
@@ -211,8 +212,8 @@ void Reader::declare_all() {
   }
 }
 
-// False if the label is another's, which is an error unless both are links, or outputs, which add
-// up.
+// Returns false if the label is already taken. This is an error unless both elements are links, or
+// both are outputs, which are added.
 bool Reader::enter_label(std::uint32_t index) {
   const Entry& entry = entries_[index];
   std::uint32_t& place = entry_of(label_of(entry));
@@ -248,7 +249,7 @@ void Reader::declare(Entry& entry) {
   } else if (keyword.element == Element::macro) {
     const Line line = open(entry);
     if (line.label.text.find(']') != std::string_view::npos) {
-      error(line, line.label, "a macro's label must not have a ']', which ends a place on it");
+      error(line, line.label, "a macro's label must not contain ']'");
     }
     entry.element = static_cast<std::uint32_t>(network.macros.size());
     macro_keywords_.push_back(&keyword);
@@ -264,13 +265,13 @@ void Reader::declare_parameter(const Line& line) {
                  "a model has at most " + std::to_string(most_parameters) + " parameters");
   }
   if (!is_identifier(line.label.text)) {
-    error(line, line.label, "a parameter's name has letters, digits and '_' only");
+    error(line, line.label, "a parameter's name may have only letters, digits and '_'");
   }
   Parameter parameter{.name = std::string(line.label.text),
                       .value = 0.0,
                       .location = {line.number, line.label.column}};
   if (!check_count(line)) {
-    // It has been told.
+    // check_count has reported it.
   } else if (line.keyword->element == Element::audio_parameter) {
     parameter.audio_input = audio_input(line);
   } else if (!parse_number(line.rest[0].text, parameter.value)) {
@@ -282,7 +283,7 @@ void Reader::declare_parameter(const Line& line) {
   out_.network.parameters.push_back(std::move(parameter));
 }
 
-// MIMS writes the place on a macro behind all other arguments: u, or u:v for a mesh.
+// Separates the coordinates of places. MIMS writes them after all arguments: u, or u:v on a mesh.
 void Reader::take_coordinates(Line& line) {
   std::size_t count = 0;
   for (std::size_t i = 0;
@@ -338,7 +339,7 @@ bool Reader::check_count(const Line& line) {
   const int found = static_cast<int>(line.rest.size());
   const int least = keyword.references + keyword.least;
   const int most = keyword.references + keyword.most;
-  // GROUP X Y: what is a number, or a place, is no group's name.
+  // A drawing is GROUP X Y. The group's name is neither a number nor a place.
   double number = 0.0;
   const bool is_like_drawing = keyword.drawable && found == least + 3;
   const std::string_view group =
@@ -364,15 +365,16 @@ bool Reader::check_count(const Line& line) {
             (most > least ? " to " + std::to_string(most) : "") +
             (most == 1 ? " argument (" : " arguments (") + std::string(keyword.arguments) +
             "), found " + std::to_string(found) +
-            (line.coordinates.empty() ? "" : " before the place on a macro") +
-            (is_like_drawing ? "; a drawing is GROUP X Y, and " + quoted(group) + " is no group"
-                             : "") +
+            (line.coordinates.empty() ? "" : " before the place on the macro") +
+            (is_like_drawing
+                 ? "; a drawing is GROUP X Y, but " + quoted(group) + " is not a group's name"
+                 : "") +
             (has_blanks ? "; an expression with blanks needs brackets, [K * 2]" : ""));
   return false;
 }
 
-// What is legal and yet hardly meant.
-void Reader::look_over() {
+// Warns of elements that are legal but probably a mistake.
+void Reader::warn_of_mistakes() {
   const Network& network = out_.network;
   if (!out_.ok()) {
     return;
@@ -381,7 +383,7 @@ void Reader::look_over() {
     return mass.kind == MassKind::point ? "the place" : quoted("@" + mass.name.text());
   };
   if (network.masses.empty() && network.macros.empty()) {
-    return say(Severity::error, 1, {"", 1}, "the model has no masses: nothing can sound");
+    return report(Severity::error, 1, {"", 1}, "the model has no masses, so it makes no sound");
   }
   std::vector<bool> attached(network.masses.size(), false);
   for (const Link& link : network.links) {
@@ -393,34 +395,34 @@ void Reader::look_over() {
   for (std::size_t i = 0; i < network.masses.size(); ++i) {
     const Mass& mass = network.masses[i];
     if (!attached[i] && mass.kind != MassKind::oscillator && mass.kind != MassKind::point) {
-      say(Severity::warning, mass.location.line, {mass.name, mass.location.column},
-          "nothing is attached to " + quoted("@" + mass.name.text()));
+      report(Severity::warning, mass.location.line, {mass.name, mass.location.column},
+             "nothing is attached to " + quoted("@" + mass.name.text()));
     }
   }
   for (const Link& link : network.links) {
-    const bool is_contact = facts_of(link.law).family == Family::contact;
+    const bool is_contact = facts_of(link.law).is_one_sided();
     if (is_contact && origins_.empty() && network.masses[link.a].kind == MassKind::position &&
         network.masses[link.b].kind != MassKind::position) {
-      say(Severity::warning, link.location.line, {link.name, link.location.column},
-          "the contact's ends look swapped: it acts while the second is below the first, here " +
-              called(network.masses[link.b]) + " below " + called(network.masses[link.a]));
+      report(Severity::warning, link.location.line, {link.name, link.location.column},
+             "the contact's ends look swapped: it acts while the second is below the first, here " +
+                 called(network.masses[link.b]) + " below " + called(network.masses[link.a]));
     }
   }
   for (const Input& input : network.inputs) {
     const Mass& pushed = network.masses[input.mass];
     if (input.is_force && (pushed.kind == MassKind::ground || pushed.kind == MassKind::position)) {
       const std::string label = "in" + std::to_string(input.number);
-      say(Severity::warning, input.location.line, {label, input.location.column},
-          "'@" + label + "' pushes " + quoted("@" + pushed.name.text()) + ", which " +
-              (pushed.kind == MassKind::ground ? "never moves" : "moves only as its input says") +
-              ": it does nothing");
+      report(Severity::warning, input.location.line, {label, input.location.column},
+             "'@" + label + "' pushes " + quoted("@" + pushed.name.text()) + ", which " +
+                 (pushed.kind == MassKind::ground ? "never moves" : "only follows its input") +
+                 ": it has no effect");
     }
   }
   for (const Macro& macro : network.macros) {
     if (macro.kind == MacroKind::body && macro.length == 0) {
-      say(Severity::error, macro.location.line, {macro.name, macro.location.column},
-          "the body " + quoted("@" + macro.name) + " has no modes: each is a line like '@" +
-              macro.name + "_1 mode @" + macro.name + " 440. 2. 1.'");
+      report(Severity::error, macro.location.line, {macro.name, macro.location.column},
+             "the body " + quoted("@" + macro.name) + " has no modes: each is a line like '@" +
+                 macro.name + "_1 mode @" + macro.name + " 440. 2. 1.'");
     }
   }
   std::vector<Input> heard = network.inputs;
@@ -429,8 +431,8 @@ void Reader::look_over() {
       heard.push_back({.number = parameter.audio_input, .location = parameter.location});
     }
   }
-  tell_gaps(heard, "in");
-  tell_gaps(network.outputs, "out");
+  warn_of_gaps(heard, "in");
+  warn_of_gaps(network.outputs, "out");
   std::vector<bool> used(network.parameters.size(), false);
   for (const Formula& formula : network.arguments) {
     for (const Step& step : formula) {
@@ -442,12 +444,13 @@ void Reader::look_over() {
   for (std::size_t i = 0; i < used.size(); ++i) {
     if (!used[i]) {
       const Parameter& parameter = network.parameters[i];
-      say(Severity::warning, parameter.location.line, {parameter.name, parameter.location.column},
-          "the parameter " + quoted(parameter.name) + " is used nowhere");
+      report(Severity::warning, parameter.location.line,
+             {parameter.name, parameter.location.column},
+             "the parameter " + quoted(parameter.name) + " is never used");
     }
   }
   if (network.outputs.empty()) {
-    say(Severity::warning, 1, {"", 1}, "the model has no output, so it will be silent");
+    report(Severity::warning, 1, {"", 1}, "the model has no output, so it will be silent");
   }
 }
 
@@ -456,9 +459,9 @@ bool ParsedNetwork::ok() const {
                       [](const Diagnostic& d) { return d.severity == Severity::error; });
 }
 
-// What is told of a line in our language is told of the whole line that it comes from.
+// Messages about a translated line point to the whole line that it came from.
 static ParsedNetwork read_synth_a_modeler(std::string_view text, ReadOptions options) {
-  ToldText told = tell_synth_a_modeler(text, options.progress);
+  Translation told = translate_synth_a_modeler(text, options.progress);
   ParsedNetwork parsed{.network = {}, .diagnostics = std::move(told.diagnostics), .motion = {}};
   if (parsed.ok()) {
     if (!options.third) {

@@ -1,4 +1,4 @@
-// core/model: the .mdl text and the Network.
+// core/model: reads the .mdl language.
 #pragma once
 
 #include <optional>
@@ -14,8 +14,7 @@ namespace ressort::model {
 
 enum class Severity { warning, error };
 
-// One thing to say about a text: where (both from 1), how many characters, and what was found and
-// expected.
+// A warning or an error. Line and column count from 1.
 struct Diagnostic {
   Severity severity = Severity::error;
   int line = 0;
@@ -25,30 +24,30 @@ struct Diagnostic {
 };
 
 struct ReadOptions {
-  // What the third state argument means, whatever the text says or shows.
+  // Meaning of the third state argument; overrides the text.
   std::optional<ThirdArgument> third;
-  std::string_view third_by = "was asked for";  // how ParsedNetwork::motion says who chose it
-  std::uint64_t most_nodes = max_macro_nodes;   // of all macros; no more than a billion
-  Progress progress = {};  // of what it stops, the only diagnostic is `stopped`, without a line
+  std::string_view third_by = "was asked for";  // the reason in ParsedNetwork::motion
+  std::uint64_t most_nodes = max_macro_nodes;   // of all macros together; at most a billion
+  Progress progress =
+      {};  // when it stops the reader, the only diagnostic is `stopped`, without a line
 };
 
 struct ParsedNetwork {
   Network network;                      // canonical; complete only if ok()
   std::vector<Diagnostic> diagnostics;  // in the order of the lines
-  std::optional<ThirdArgument> third;   // nothing: the meanings agree
-  std::string motion;                   // the same for a person, and why
+  std::optional<ThirdArgument> third;   // empty: both meanings agree
+  std::string motion;                   // the meaning in words, and the reason
   bool ok() const;
 };
 
-// Reads a whole model; goes on after an error, so that every problem is told at once. Never
-// throws; what it takes in memory is bounded by the text. A model may be at most
-// `max_model_bytes` long. [any thread but audio]
+// Reads a whole model of at most `max_model_bytes`. Continues after an error, to report all of
+// them. Never throws; the memory is proportional to the text. [any thread but audio]
 ParsedNetwork parse_network(std::string_view text, const ReadOptions& options = {});
 
 inline constexpr std::size_t max_model_bytes = std::size_t{32} << 20;
-inline constexpr int max_channels = 64;  // of inputs, and of outputs
+inline constexpr int max_channels = 64;  // of inputs and of outputs each
 
-// "file:line:column: error: message".
+// Returns "file:line:column: error: message".
 std::string to_string(const Diagnostic& diagnostic, std::string_view file);
 
 }  // namespace ressort::model

@@ -12,7 +12,7 @@
 namespace ressort::model {
 namespace {
 
-// A law may have many words: the first that needs no more arguments than the link has.
+// Chooses the first keyword of the law that fits the arguments of the link.
 const LawWord& word_of(const Link& link) {
   const auto& words = facts_of(link.law).words;
   return *std::find_if(words.begin(), words.end(), [&](const LawWord& word) {
@@ -47,7 +47,7 @@ class Printer {
   }
 
  private:
-  // Names for what has none. Links may share a name with each other, and with nothing else.
+  // Chooses names for elements without one. Links may share a name with other links only.
   void name_elements() {
     for (const Parameter& parameter : network_.parameters) {
       parameters_.push_back(parameter.name);
@@ -88,7 +88,7 @@ class Printer {
     text_ += "@" + label + " " + std::string(keyword) + rest + "\n";
   }
 
-  // Opens and closes blocks, so that what comes next stands in the group.
+  // Opens and closes blocks, so that the next element is in the group.
   void enter(std::string_view group) {
     if (group == group_) {
       return;
@@ -118,7 +118,7 @@ class Printer {
     return text;
   }
 
-  // Enters the element's group first.
+  // Starts the element's line, after entering its group.
   std::string position(double z, std::uint32_t drawing) {
     const std::string number = print_number(z);
     if (drawing == 0) {
@@ -241,7 +241,7 @@ class Printer {
     }
   }
 
-  // Every argument that is there, and every one that the word cannot do without.
+  // Prints all arguments that are set or required.
   std::string link_arguments(const Link& link, const LawWord& word) const {
     std::string text;
     const auto first = static_cast<std::size_t>(word.first);
@@ -298,7 +298,7 @@ class Printer {
            (tap.v == no_argument ? "" : coordinate(tap.v)) + "]";
   }
 
-  // By its name, where it is at one.
+  // Prints the name of the place if the coordinate is exactly there.
   std::string place_on(const Macro& body, ArgumentId u) const {
     const Formula& formula = network_.arguments[u];
     if (is_constant(formula)) {
@@ -316,7 +316,7 @@ class Printer {
     return " " + print_expression(network_.arguments[id], parameters_);
   }
 
-  // The node of an expanded macro at the place, or, below a comment, near it.
+  // Returns the node of an expanded macro at the place, or the nearest one, after a comment.
   std::uint32_t nearest_node(const Tap& tap) {
     const std::vector<double> parameters = parameter_values(network_);
     bool is_exact = true;
@@ -339,13 +339,13 @@ class Printer {
 
   const Network& network_;
   std::string text_;
-  std::string group_;                     // of the open block
+  std::string group_;                     // the open block
   std::vector<std::string> parameters_;   // names
   std::vector<std::string> masses_;       // names
   std::unordered_set<std::string> used_;  // labels
 };
 
-// The starting states, which do not depend on how places are written.
+// The states at the start, which do not depend on the notation of places.
 std::vector<std::pair<double, double>> states(const Network& network) {
   std::vector<std::pair<double, double>> found;
   for (const Mass& mass : network.masses) {

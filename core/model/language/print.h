@@ -1,4 +1,4 @@
-// core/model: a Network as text again.
+// core/model: prints a Network in the .mdl language.
 #pragma once
 
 #include <string>
@@ -7,13 +7,14 @@
 
 namespace ressort::model {
 
-// The text of a network, in one dialect (MIMS4Max's, and 'massG' for a gravity that is not per
-// rate): `parse_network(print_network(n)).network == n` for every network that was read. A line
-// '~motion' is there only where the rest of the text would be taken for the other meaning.
+// Prints a network in one dialect: that of MIMS4Max, with 'massG' for a gravity that is not per
+// rate. `parse_network(print_network(n)).network == n` holds for every network that was read. The
+// line
+// '~motion' is printed only if the reader would otherwise choose the other meaning.
 //
-// Masses and links without names, as expand_macros makes them, get some that are free. A place
-// between the nodes of an expanded macro has no text: its nearest node stands for it, below a
-// comment that says so. [any thread but audio]
+// Masses and links without names (see expand_macros) get unused ones. A place between the nodes of
+// an expanded macro cannot be written: the nearest node replaces it, after a comment. [any thread
+// but audio]
 std::string print_network(const Network& network);
 
 }  // namespace ressort::model

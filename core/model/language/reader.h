@@ -1,7 +1,8 @@
-// core/model: the reader behind parse_network, for mdl.cpp, elements.cpp, macros.cpp and motion.cpp
-// only.
+// core/model: the implementation of parse_network, shared by mdl.cpp, elements.cpp, macros.cpp and
+// motion.cpp.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -20,16 +21,15 @@ namespace ressort::model {
 
 inline constexpr int most_diagnostics = 100;  // errors, and as many warnings
 inline constexpr std::size_t longest_label = 1000;
-inline constexpr std::size_t most_parameters = 1024;   // each is looked for in every expression
+inline constexpr std::size_t most_parameters = 1024;   // every expression searches all of them
 inline constexpr std::size_t most_open_blocks = 1024;  // ~begin without its ~end
 
-// What stands for the mass or macro that a line declares where it declares none, or not as the
-// first to do so.
+// Index of a line that declares no mass or macro, or repeats the label of another.
 inline constexpr std::uint32_t undeclared = 0xffffffffu;
 
-// What is kept of a line, a few bytes each; it is split anew for every reading.
+// A line of the text. To save memory, its tokens are split again whenever they are needed.
 struct Entry {
-  std::uint32_t at = 0;  // where it starts in the text, and how long it is
+  std::uint32_t at = 0;  // offset in the text, and length
   std::uint32_t length = 0;
   int number = 0;
   std::uint32_t group = 0;  // index into Reader::group_names_
@@ -37,7 +37,7 @@ struct Entry {
   std::uint8_t keyword = 0;  // index into keywords
 };
 
-// A line that is being read.
+// The line that the reader works on.
 struct Line {
   int number = 0;
   const Keyword* keyword = nullptr;
@@ -45,19 +45,42 @@ struct Line {
   Token word;              // the keyword as written
   std::string_view group;  // of the display block around it; empty if there is none
   std::span<const Token> rest;
-  std::span<const Token> coordinates;  // of macros referred to without brackets, in MIMS
+  std::span<const Token> coordinates;  // of places written without brackets, as in MIMS
   std::uint32_t element = undeclared;  // the mass or macro
 };
 
-// The first line that shows something, and by what: "opens a block".
+// The first line that reveals a dialect, and how: "opens a block".
 struct Evidence {
-  int line = 0;  // 0: none does
+  int line = 0;  // 0: none
   std::string_view what;
+};
+
+// Adds diagnostics to a list, up to most_diagnostics of either severity.
+class DiagnosticCount {
+ public:
+  void report(std::vector<Diagnostic>& list, Severity severity, int line, const Token& token,
+              std::string message) {
+    int& count = severity == Severity::error ? errors_ : warnings_;
+    if (++count > most_diagnostics + 1) {
+      return;
+    }
+    if (count == most_diagnostics + 1) {
+      message = severity == Severity::error ? "too many errors; stopping here"
+                                            : "too many warnings; the rest are not shown";
+    }
+    list.push_back({severity, line, token.column, std::max(1, static_cast<int>(token.text.size())),
+                    std::move(message)});
+  }
+  bool is_full() const { return errors_ > most_diagnostics; }
+
+ private:
+  int errors_ = 0;
+  int warnings_ = 0;
 };
 
 class Reader {
  public:
-  // `origins`: where the lines come from, if the text is told from another's.
+  // `origins`: the source lines, if the text was translated from another language.
   explicit Reader(std::span<const Origin> origins = {}) : origins_(origins) {}
 
   ParsedNetwork read(std::string_view text, const ReadOptions& options);
@@ -115,26 +138,16 @@ class Reader {
   void decide_by_dialect();
   void decide_by_states();
   void choose_motion(ThirdArgument third, const std::string& why);
-  void look_over();
+  void warn_of_mistakes();
 
-  void say(Severity severity, int line, const Token& token, std::string message) {
-    int& told = severity == Severity::error ? errors_ : warnings_;
-    if (++told > most_diagnostics) {
-      if (told == most_diagnostics + 1) {
-        out_.diagnostics.push_back(
-            {severity, line, token.column, 1, "too many problems; those after this are not told"});
-      }
-      return;
-    }
-    out_.diagnostics.push_back({severity, line, token.column,
-                                std::max(1, static_cast<int>(token.text.size())),
-                                std::move(message)});
+  void report(Severity severity, int line, const Token& token, std::string message) {
+    count_.report(out_.diagnostics, severity, line, token, std::move(message));
   }
   void error(const Line& line, const Token& token, std::string message) {
-    say(Severity::error, line.number, token, std::move(message));
+    report(Severity::error, line.number, token, std::move(message));
   }
   void warning(const Line& line, const Token& token, std::string message) {
-    say(Severity::warning, line.number, token, std::move(message));
+    report(Severity::warning, line.number, token, std::move(message));
   }
 
   static void show(Evidence& evidence, const Line& line, std::string_view what) {
@@ -143,9 +156,9 @@ class Reader {
     }
   }
 
-  // Channels are numbered by hand; one that is left out is silent.
+  // Warns of missing channel numbers, which are silent.
   template <class Channels>
-  void tell_gaps(const Channels& channels, std::string_view name) {
+  void warn_of_gaps(const Channels& channels, std::string_view name) {
     int last = 0;
     SourceLocation location;
     std::vector<int> numbers;
@@ -158,15 +171,15 @@ class Reader {
     }
     const std::string label = "@" + std::string(name);
     std::sort(numbers.begin(), numbers.end());
-    int next = 1;  // what is to come without a gap
+    int next = 1;  // the next number without a gap
     for (const int number : numbers) {
       if (number > next) {
         const std::string first = label + std::to_string(next);
-        say(Severity::warning, location.line, {name, location.column},
-            "there is " + label + std::to_string(last) + ", but " +
-                (number == next + 1
-                     ? "no " + first
-                     : "none of " + first + " to " + label + std::to_string(number - 1)));
+        report(Severity::warning, location.line, {name, location.column},
+               "there is " + label + std::to_string(last) + ", but " +
+                   (number == next + 1
+                        ? "no " + first
+                        : "none of " + first + " to " + label + std::to_string(number - 1)));
       }
       next = number + 1;
     }
@@ -174,12 +187,11 @@ class Reader {
 
   std::span<const Origin> origins_;  // [line - 1]
   ParsedNetwork out_;
-  int errors_ = 0;
-  int warnings_ = 0;
+  DiagnosticCount count_;
   std::string_view text_;
   std::vector<Entry> entries_;
   IndexTable labels_;          // of entries
-  std::vector<Token> tokens_;  // of the line that is being read
+  std::vector<Token> tokens_;  // of the current line
   std::vector<Token> parts_;   // of a place in it
   std::vector<std::string> parameter_names_;
   std::vector<const Keyword*> macro_keywords_;                  // [macro]
@@ -188,10 +200,10 @@ class Reader {
   std::uint64_t nodes_ = 0;                                     // of all macros
   std::unordered_map<std::string_view, ArgumentId> arguments_;  // text -> index
   std::vector<std::string_view> group_names_ = {""};            // of all display blocks
-  std::vector<std::uint32_t> groups_;                           // those that are open
-  Evidence velocity_;                                           // of a form that only MIMS4Max has
-  Evidence delayed_;                                            // of a form that only MIMS has
-  std::optional<ThirdArgument> said_;                           // by ~motion
+  std::vector<std::uint32_t> groups_;                           // the open ones
+  Evidence velocity_;                                           // of MIMS4Max
+  Evidence delayed_;                                            // of MIMS
+  std::optional<ThirdArgument> said_;                           // set by ~motion
   int said_line_ = 0;
 };
 

@@ -86,7 +86,8 @@ std::string_view first_letter(std::string_view text, std::size_t& length) {
   for (std::size_t i = 1; is_letter && i < wanted; ++i) {
     is_letter = (byte(i) & 0xc0) == 0x80;
   }
-  is_letter &= !(first == 0xc2 && wanted <= text.size() && byte(1) < 0xa0);  // more controls
+  is_letter &=
+      !(first == 0xc2 && wanted <= text.size() && byte(1) < 0xa0);  // C1 control characters
   length = is_letter ? wanted : 1;
   return is_letter ? text.substr(0, wanted) : "?";
 }

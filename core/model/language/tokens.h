@@ -1,4 +1,4 @@
-// core/model: the pieces of a line of text, and how they are shown to a person.
+// core/model: splits lines into tokens, and quotes text in messages.
 #pragma once
 
 #include <string>
@@ -14,32 +14,32 @@ struct Token {
   int column = 0;
 };
 
-// Tokens are divided by blanks; [...] and '...' hold together; '#' starts a comment.
+// Splits a line at blanks. [...] and '...' are one token each; '#' starts a comment.
 void split(std::string_view line, std::vector<Token>& tokens);
 std::vector<Token> split(std::string_view line);
 
-// The characters of a text before a blank, a comment or a '['.
+// Returns the text up to a blank, a comment or a '['.
 std::string_view first_word(std::string_view text);
 
-// What stands between [ ] or ' ', or the token itself.
+// Removes [ ] or ' ' around a token.
 Token unwrapped(Token token);
 
-// Letters, digits and '_', no digit first.
+// Returns true for letters, digits and '_' that do not start with a digit.
 bool is_identifier(std::string_view text);
 
-// The first letter of a text, of one byte or several; a '?' in its place where it cannot be printed
-// or is no UTF-8, and `length` is how much of the text it takes.
+// Returns the first UTF-8 character of a text, or '?' if it is invalid or not printable. Sets
+// `length` to its length in bytes.
 std::string_view first_letter(std::string_view text, std::size_t& length);
 
-// 'text', without what cannot be printed, and not too long.
+// Returns the text in quotes, shortened, with '?' for characters that are not printable.
 std::string quoted(std::string_view text);
 
-// How many letters have to change to get from one word to the other (Levenshtein).
+// Returns the Levenshtein distance between two words.
 std::size_t distance(std::string_view from, std::string_view to);
 
-inline constexpr std::size_t most_suggestions = 2000;  // names looked at; none is worth a wait
+inline constexpr std::size_t most_suggestions = 2000;  // names compared, to limit the time
 
-// The nearest of `names`, as "; did you mean 'x'?", or nothing when none is near.
+// Returns "; did you mean 'x'?" for the most similar of `names`, or "" if none is similar.
 template <class Names>
 std::string suggestion(std::string_view word, const Names& names, std::string_view prefix = "") {
   std::string_view best;

@@ -1,9 +1,9 @@
-// What a model without a preset is played with, and why no key plays it.
+// Chooses the preset of a model that has none.
 #include <algorithm>
 #include <cmath>
 #include <string>
 
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 #include "core/model/preset/preset.h"
 #include "core/model/topology.h"
 
@@ -14,10 +14,21 @@ bool never_moves(const Mass& mass) {
   return mass.kind == MassKind::ground || mass.kind == MassKind::position;
 }
 
-// The first link of a family at a mass; null where there is none.
-const Link* find_link(const Network& network, std::uint32_t mass, Family family) {
+bool is_pluck(const LawFacts& law) {
+  return law.lets_go() && !law.is_one_sided();
+}
+bool is_bow(const LawFacts& law) {
+  return law.is_friction;
+}
+bool is_contact(const LawFacts& law) {
+  return law.is_one_sided();
+}
+
+// Returns the first link at a mass with such a law, or null.
+const Link* find_link(const Network& network, std::uint32_t mass,
+                      bool (*has_law)(const LawFacts&)) {
   const auto at_mass = [&](const Link& link) {
-    return facts_of(link.law).family == family && (link.a == mass || link.b == mass);
+    return has_law(facts_of(link.law)) && (link.a == mass || link.b == mass);
   };
   const auto found = std::find_if(network.links.begin(), network.links.end(), at_mass);
   return found == network.links.end() ? nullptr : &*found;
@@ -28,9 +39,9 @@ double reach_of(const Network& network, const Link& link) {
                         parameter_values(network));
 }
 
-// How a key plays an input: struck, plucked, bowed or hit as its links ask for; nothing where
-// none does. Loudness is the level's, so that every velocity sounds as the law does best; only
-// blows get brighter as they get harder.
+// Returns the gesture with which a key plays an input, depending on the laws of its links: strike,
+// pluck, bow or swing. Returns nothing if none fits. Velocity sets the level, not the force, so
+// that every note has the best sound of its law; only blows get brighter with velocity.
 std::optional<ControlSetting> played_by_key(const Network& network, const Input& input) {
   constexpr double softest_db = -26.0;
   ControlSetting note{.target = "in" + std::to_string(input.number)};
@@ -48,21 +59,21 @@ std::optional<ControlSetting> played_by_key(const Network& network, const Input&
   }
   note.has_level = true;
   note.low_db = softest_db;
-  if (const Link* const pluck = find_link(network, input.mass, Family::pluck)) {
+  if (const Link* const pluck = find_link(network, input.mass, is_pluck)) {
     const double scale = reach_of(network, *pluck);
     note.gesture = Gesture::pluck;
     note.travel = 5.0 * scale;
-    // The slower the finger, the more it gives to the string before that slips away.
+    // The slower the finger, the further it deflects the string before it slips.
     note.low = 0.15 * scale;
     note.high = 0.05 * scale;
     note.exponential = true;
-  } else if (const Link* const bow = find_link(network, input.mass, Family::bow)) {
+  } else if (const Link* const bow = find_link(network, input.mass, is_bow)) {
     const double scale = reach_of(network, *bow);
     note.gesture = Gesture::bow;
     note.low = 0.5 * scale;
     note.high = 0.7 * scale;
-  } else if (const Link* const contact = find_link(network, input.mass, Family::contact)) {
-    // The first end is the lower one: the mallet swings from its own side.
+  } else if (const Link* const contact = find_link(network, input.mass, is_contact)) {
+    // The first end is the lower one, so the mallet swings from that side.
     const double side = contact->a == input.mass ? 1.0 : -1.0;
     note.gesture = Gesture::swing;
     note.travel = 0.1 + std::fabs(reach_of(network, *contact));
@@ -76,14 +87,14 @@ std::optional<ControlSetting> played_by_key(const Network& network, const Input&
   return note;
 }
 
-// As many as a core should bear of so many masses.
+// Returns a number of voices of this size that one core can compute.
 int usual_voices(const Network& network) {
   constexpr std::size_t most_masses = 2000;
   return std::clamp(static_cast<int>(most_masses / std::max<std::size_t>(1, moving_count(network))),
                     1, 8);
 }
 
-// What a force could strike, as a line refers to it; empty where nothing moves.
+// Returns a reference to something that a force input could strike, or "" if nothing moves.
 std::string something_to_strike(const Network& network) {
   for (const Mass& mass : network.masses) {
     if (moves(mass)) {

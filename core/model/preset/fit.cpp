@@ -5,7 +5,7 @@
 #include <cmath>
 #include <string>
 
-#include "core/laws/laws.h"
+#include "core/laws/law.h"
 #include "core/model/language/tokens.h"
 
 namespace ressort::model {
@@ -19,7 +19,7 @@ std::string names(const Network& network) {
   return text.empty() ? "none" : text;
 }
 
-// What is wrong with the control; empty if nothing is.
+// Returns an error message for the control, or "".
 std::string misfit(const Network& network, const ControlSetting& control) {
   if (control.gesture == Gesture::parameter) {
     return find_parameter(network, control.target) < 0 ? no_parameter(network, control.target)
@@ -33,15 +33,15 @@ std::string misfit(const Network& network, const ControlSetting& control) {
            std::to_string(network.inputs.size());
   }
   if (control.in_swings && !touch_of(network, static_cast<std::size_t>(input))) {
-    return "'" + control.target + "' touches nothing: a swing needs a contact or a pluck there";
+    return "'" + control.target + "' has no contact or pluck, so its range cannot be in swings";
   }
   return network.inputs[static_cast<std::size_t>(input)].is_force &&
                  row_of(control.gesture).needs_position
-             ? "'" + control.target + "' is a force input, which this gesture cannot play"
+             ? "'" + control.target + "' is a force input, but this gesture needs a position input"
              : "";
 }
 
-// Marks all that carry a label; false if none does.
+// Marks all elements with a label; returns false if there are none.
 bool fix(Network& network, const std::string& label) {
   bool is_there = false;
   const auto mark = [&](auto& elements) {
@@ -92,17 +92,16 @@ std::optional<Touch> touch_of(const Network& network, std::size_t input) {
   const std::uint32_t hand = network.inputs[input].mass;
   for (const Link& link : network.links) {
     const LawFacts& facts = facts_of(link.law);
-    const bool is_touched = facts.family == Family::contact || facts.family == Family::pluck;
-    if (network.inputs[input].is_force || !is_touched || (link.a != hand && link.b != hand)) {
+    if (network.inputs[input].is_force || !facts.lets_go() || (link.a != hand && link.b != hand)) {
       continue;
     }
     const double reach =
         argument_value(network, link.arguments[facts.slot(Role::reach)], parameter_values(network));
     const std::uint32_t mass = link.a == hand ? link.b : link.a;
     const double rest = network.masses[mass].position;
-    // Of a contact the first end is the lower one; a finger comes from where the model has it.
+    // The first end of a contact is the lower one. A pluck is touched from the side of its start.
     const bool is_below =
-        facts.family == Family::contact ? link.a == hand : network.masses[hand].position < rest;
+        facts.is_one_sided() ? link.a == hand : network.masses[hand].position < rest;
     const double inwards = is_below ? 1.0 : -1.0;
     return Touch{.mass = mass, .position = rest - inwards * std::fabs(reach), .inwards = inwards};
   }
@@ -137,7 +136,7 @@ std::vector<Error> find_preset_errors(const Network& network, const Preset& pres
   Network marked = preset.fixed.empty() ? Network() : network;
   for (const std::string& label : preset.fixed) {
     if (!fix(marked, label)) {
-      found.push_back({"the model has nothing labelled " + quoted(label) + " that keys could leave",
+      found.push_back({"the model has no element " + quoted(label) + " for 'fixed'",
                        preset.model_location.line, preset.model_location.column});
     }
   }
@@ -155,7 +154,7 @@ std::vector<Error> find_preset_errors(const Network& network, const Preset& pres
        std::none_of(preset.parameters.begin(), preset.parameters.end(), is_tuned_along))) {
     found.push_back({preset.morph.empty()
                          ? "'tuned_along' must name one of [parameters] with a range"
-                         : "keys are tuned along the morph; leave 'tuned_along' out",
+                         : "keys stay in tune along the morph anyway; remove 'tuned_along'",
                      preset.tuned_along_location.line, preset.tuned_along_location.column});
   }
   for (const ControlSetting& control : preset.controls) {

@@ -1,4 +1,4 @@
-// core/model: whether a preset fits a network.
+// core/model: checks that a preset fits a network.
 #pragma once
 
 #include <cstddef>
@@ -14,31 +14,31 @@
 
 namespace ressort::model {
 
-// The input "inN" as an index into Network::inputs, and the parameter as one into
-// Network::parameters; -1 where there is none.
+// Return the index of input "inN" in Network::inputs, and of the parameter in Network::parameters;
+// -1 if there is none.
 int find_input(const Network& network, std::string_view target);
 int find_parameter(const Network& network, std::string_view name);
-// What to say of a parameter that there is not.
+// Returns the error message for an unknown parameter.
 std::string no_parameter(const Network& network, const std::string& name);
 
-// Where a hand begins to feel what rests at the other end of its contact or its pluck, and which
-// way goes into it: 1 upwards, -1 downwards. Nothing where it has neither.
+// The position at which an input begins to touch a resting mass through a contact or a pluck, and
+// the direction of the touch: 1 upwards, -1 downwards.
 struct Touch {
-  std::uint32_t mass = 0;  // at that end
+  std::uint32_t mass = 0;  // the mass that is touched
   double position = 0.0;
   double inwards = 1.0;
 };
 std::optional<Touch> touch_of(const Network& network, std::size_t input);
 
-// The network with an output at each mass that the preset's swings are of, and no other, and with
-// the hands there far away.
+// Returns the network with one output at each mass that a control in swings touches, no others, and
+// these inputs far away from the masses.
 Network heard_where_touched(Network network, const Preset& preset);
 
-// All that the preset names and the network does not have or cannot do, in the order of the
-// preset's lines. [any thread but audio]
+// Returns an error for everything in the preset that the network does not have or support, in the
+// order of the preset's lines. [any thread but audio]
 std::vector<Error> find_preset_errors(const Network& network, const Preset& preset);
 
-// The network with what the preset says is fixed marked so. O(elements) [any thread but audio]
+// Sets is_fixed for the elements in the preset's `fixed`. O(elements) [any thread but audio]
 Network with_fixed(Network network, const Preset& preset);
 
 }  // namespace ressort::model

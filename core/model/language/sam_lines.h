@@ -1,4 +1,5 @@
-// core/model: the statements of a Synth-A-Modeler text, and the arithmetic in their arguments.
+// core/model: parses the statements of a Synth-A-Modeler text, and the arithmetic in their
+// arguments.
 #pragma once
 
 #include <map>
@@ -6,12 +7,13 @@
 #include <string_view>
 #include <vector>
 
+#include "core/model/language/reader.h"
 #include "core/model/language/synth_a_modeler.h"
-#include "core/model/language/tokens.h"
 
 namespace ressort::model {
 
-// `word(arguments),names;`, or `audioout,name,expression;`, whose one argument is the expression.
+// `word(arguments),names;`, or `audioout,name,expression;` with the expression as its only
+// argument.
 struct Statement {
   Origin origin;
   Token word;
@@ -20,53 +22,52 @@ struct Statement {
 };
 
 // `faustcode: name = expression;`
-struct FaustLine {
+struct SamDefinition {
   Origin origin;
   Token expression;
   bool is_parameter = false;
-  bool is_open = false;  // it is being read: what it is made of must not need it
+  bool is_open = false;  // being resolved; detects cycles
   bool is_read = false;
-  std::string text;  // in our language, once it is read
+  std::string text;  // in the .mdl language, once resolved
 };
 
-inline constexpr std::size_t longest_expression = 10000;  // bytes, all definitions put in
+inline constexpr std::size_t longest_expression = 10000;  // bytes, with all definitions inserted
 inline constexpr int deepest_expression = 50;
 
-// How long the word, or the number, at the start of the text is.
+// Return the length of the word, or the number, at the start of the text.
 std::size_t word_length(std::string_view text);
 std::size_t number_length(std::string_view text);
 
-// Divided at `mark`, as far as it stands in no parentheses and no quotes.
+// Splits a token at `mark`, except within parentheses and quotes.
 std::vector<Token> divided(const Token& token, char mark);
 Token trimmed(Token token);
 
-// Reads lines, and keeps what all of them define.
-class FaustLines {
+// Parses the lines of a text and stores their definitions.
+class SamLines {
  public:
   void read(std::string_view text, const Progress& progress);
 
-  // An expression of parameters and numbers, in our language; "0" where it is none, which is told.
+  // Translates an expression of parameters and numbers. Returns "0" after reporting an error.
   std::string expression(const Origin& line, const Token& token) {
     return expression(line, token, 0);
   }
-  // The same of a text in our language, as short as it gets.
+  // Simplifies an expression in the .mdl language.
   std::string tidy(const Origin& line, const Token& token, const std::string& text);
-  // Its value with the parameters as they start.
+  // Evaluates an expression with the initial values of the parameters.
   double value(const std::string& text) const;
   bool is_number_name(const std::string& name) const { return lines_.contains(name); }
 
-  bool is_full() const;  // more errors are not told
-  void say(Severity severity, const Origin& line, const Token& token, std::string message);
+  bool is_full() const { return count_.is_full(); }
   void error(const Origin& line, const Token& token, std::string message) {
-    say(Severity::error, line, token, std::move(message));
+    count_.report(diagnostics, Severity::error, line.line, token, std::move(message));
   }
   void warning(const Origin& line, const Token& token, std::string message) {
-    say(Severity::warning, line, token, std::move(message));
+    count_.report(diagnostics, Severity::warning, line.line, token, std::move(message));
   }
 
   std::vector<Statement> statements;
-  std::vector<std::string> parameters;  // names, in the order of the lines
-  std::vector<double> values;           // of the parameters
+  std::vector<std::string> parameters;  // names, in order of their lines
+  std::vector<double> values;           // [parameter] initial value
   std::vector<Origin> parameter_lines;
   std::vector<Diagnostic> diagnostics;
 
@@ -78,10 +79,9 @@ class FaustLines {
   bool read_end(const Origin& origin, Token& rest);
   bool read_slider(const Origin& origin, const Token& token, double& start);
 
-  std::map<std::string, FaustLine> lines_;  // by the name that they define
-  std::size_t spent_ = 0;                   // bytes of expressions
-  int errors_ = 0;
-  int warnings_ = 0;
+  std::map<std::string, SamDefinition> lines_;  // by name
+  std::size_t spent_ = 0;                       // total bytes of expressions
+  DiagnosticCount count_;
 };
 
 }  // namespace ressort::model

@@ -1,11 +1,10 @@
-#include "core/model/language/faust_lines.h"
+#include "core/model/language/sam_lines.h"
 
 #include <algorithm>
 #include <cctype>
 #include <cmath>
 
 #include "core/model/language/expression.h"
-#include "core/model/language/reader.h"
 
 namespace ressort::model {
 namespace {
@@ -27,7 +26,7 @@ bool is_of_a_name(char c) {
   return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
 }
 
-// The line up to its comment, which starts with '#' or '//'.
+// Returns the line without its comment, which starts with '#' or '//'.
 std::string_view without_comment(std::string_view line) {
   bool is_quoted = false;
   for (std::size_t i = 0; i < line.size(); ++i) {
@@ -43,7 +42,7 @@ Token behind(const Token& token, std::size_t count) {
   return {token.text.substr(count), token.column + static_cast<int>(count)};
 }
 
-// Where the ')' of the '(' at the start stands; npos if nowhere.
+// Returns the offset of the ')' that closes the '(' at the start, or npos.
 std::size_t closing(std::string_view text) {
   int depth = 0;
   bool is_quoted = false;
@@ -130,24 +129,7 @@ bool is_synth_a_modeler(std::string_view text) {
   return false;
 }
 
-bool FaustLines::is_full() const {
-  return errors_ > most_diagnostics;
-}
-
-void FaustLines::say(Severity severity, const Origin& line, const Token& token,
-                     std::string message) {
-  int& told = severity == Severity::error ? errors_ : warnings_;
-  if (++told > most_diagnostics) {
-    if (told > most_diagnostics + 1) {
-      return;
-    }
-    message = "too many problems; those after this are not told";
-  }
-  diagnostics.push_back({severity, line.line, token.column,
-                         std::max(1, static_cast<int>(token.text.size())), std::move(message)});
-}
-
-void FaustLines::read(std::string_view text, const Progress& progress) {
+void SamLines::read(std::string_view text, const Progress& progress) {
   if (text.starts_with("\xef\xbb\xbf")) {
     text.remove_prefix(3);
   }
@@ -162,13 +144,13 @@ void FaustLines::read(std::string_view text, const Progress& progress) {
   for (auto& [name, line] : lines_) {
     if (!line.is_parameter && !line.is_read) {
       named(line.origin, {name, line.origin.column},
-            0);  // so that a wrong one that nobody uses is told
+            0);  // report errors in unused definitions, too
     }
   }
 }
 
-// Takes the ';' off, behind which nothing may stand.
-bool FaustLines::read_end(const Origin& origin, Token& rest) {
+// Removes the final ';' and reports text after it.
+bool SamLines::read_end(const Origin& origin, Token& rest) {
   const std::vector<Token> parts = divided(rest, ';');
   if (parts.size() == 1) {
     error(origin, {"", rest.column + static_cast<int>(rest.text.size())},
@@ -176,14 +158,14 @@ bool FaustLines::read_end(const Origin& origin, Token& rest) {
     return false;
   }
   if (parts.size() > 2 || !parts[1].text.empty()) {
-    error(origin, parts[1], "expected nothing behind the ';', one statement in a line");
+    error(origin, parts[1], "expected nothing after ';': write one statement per line");
     return false;
   }
   rest = parts[0];
   return true;
 }
 
-void FaustLines::read_line(std::string_view text, int number) {
+void SamLines::read_line(std::string_view text, int number) {
   const Token line = trimmed({without_comment(text), 1});
   if (line.text.empty()) {
     return;
@@ -207,10 +189,10 @@ void FaustLines::read_line(std::string_view text, int number) {
     const std::size_t last = rest.text.starts_with('(') ? closing(rest.text) : 0;
     if (last == 0 || last == std::string_view::npos) {
       return error(origin, {rest.text.substr(0, 1), rest.column},
-                   last == 0 ? "expected '(' behind " + quoted(word) : "this ( is never closed");
+                   last == 0 ? "expected '(' after " + quoted(word) : "this ( is never closed");
     }
     Token inner = trimmed({rest.text.substr(1, last - 1), rest.column + 1});
-    // (f,T60,m, ...) may have parentheses of its own.
+    // (f,T60,m, ...) may have a second pair of parentheses.
     if (inner.text.starts_with('(') && closing(inner.text) == inner.text.size() - 1) {
       inner = trimmed({inner.text.substr(1, inner.text.size() - 2), inner.column + 1});
     }
@@ -226,9 +208,9 @@ void FaustLines::read_line(std::string_view text, int number) {
     return error(origin, {rest.text.substr(0, 1), rest.column}, "expected ',' and a name");
   }
   statement.names = divided(behind(rest, 1), ',');
-  if (word == "audioout") {  // all behind the name is the expression
+  if (word == "audioout") {  // the rest is the expression
     if (statement.names.size() < 2) {
-      return error(origin, rest, "expected audioout,name,what is heard;");
+      return error(origin, rest, "expected audioout,name,signal;");
     }
     const Token& first = statement.names[1];
     const auto skipped = static_cast<std::size_t>(first.column - rest.column);
@@ -238,8 +220,8 @@ void FaustLines::read_line(std::string_view text, int number) {
   statements.push_back(std::move(statement));
 }
 
-// hslider("label", start, least, most, step) and its sisters.
-bool FaustLines::read_slider(const Origin& origin, const Token& token, double& start) {
+// Reads hslider("label", start, least, most, step), vslider or nentry.
+bool SamLines::read_slider(const Origin& origin, const Token& token, double& start) {
   const std::string_view word = token.text.substr(0, word_length(token.text));
   const Token rest = trimmed(behind(token, word.size()));
   if ((word != "hslider" && word != "vslider" && word != "nentry") || !rest.text.starts_with('(')) {
@@ -257,24 +239,24 @@ bool FaustLines::read_slider(const Origin& origin, const Token& token, double& s
               "(\"label\", start, least, most, step), the start a number");
   } else if (last + 1 != rest.text.size()) {
     error(origin, trimmed(behind(rest, last + 1)),
-          "what follows a slider is FAUST code, which is not read: leave it out");
+          "FAUST code after a slider is not supported: remove it");
   }
   return true;
 }
 
-void FaustLines::read_definition(const Origin& origin, const Token& rest) {
+void SamLines::read_definition(const Origin& origin, const Token& rest) {
   const std::size_t equals = rest.text.find('=');
   const Token name =
       trimmed({rest.text.substr(0, std::min(equals, rest.text.size())), rest.column});
   if (equals == std::string_view::npos || !is_identifier(name.text)) {
     return error(origin, name,
-                 "FAUST code is not read, but for sliders and arithmetic: expected "
+                 "FAUST code is not supported, except sliders and arithmetic: expected "
                  "name=hslider(\"label\",start,least,most,step); or name=number;");
   }
   if (name.text == "fs" || name.text == "PI" || name.text == "clamp" ||
       std::find(std::begin(faust_functions), std::end(faust_functions), name.text) !=
           std::end(faust_functions)) {
-    return error(origin, name, quoted(name.text) + " has a meaning already");
+    return error(origin, name, quoted(name.text) + " is a reserved name");
   }
   const auto [found, is_new] = lines_.try_emplace(std::string(name.text));
   if (!is_new) {
@@ -282,7 +264,7 @@ void FaustLines::read_definition(const Origin& origin, const Token& rest) {
                  quoted(name.text) + " is already defined in line " +
                      std::to_string(found->second.origin.line));
   }
-  FaustLine& line = found->second;
+  SamDefinition& line = found->second;
   line.origin = origin;
   if (lines_.size() > most_parameters) {
     line.is_read = true;
@@ -302,15 +284,15 @@ void FaustLines::read_definition(const Origin& origin, const Token& rest) {
   }
 }
 
-std::string FaustLines::named(const Origin& line, const Token& name, int depth) {
-  FaustLine& found = lines_.find(std::string(name.text))->second;
+std::string SamLines::named(const Origin& line, const Token& name, int depth) {
+  SamDefinition& found = lines_.find(std::string(name.text))->second;
   if (found.is_parameter || found.is_read) {
     return found.text;
   }
   if (found.is_open || depth >= deepest_expression) {
     error(line, name,
-          quoted(name.text) + (found.is_open ? " is defined by itself"
-                                             : " is made of more than 50 definitions in a row"));
+          quoted(name.text) + (found.is_open ? " is defined in terms of itself"
+                                             : " depends on more than 50 definitions in a row"));
     return "0";
   }
   found.is_open = true;
@@ -320,9 +302,9 @@ std::string FaustLines::named(const Origin& line, const Token& name, int depth) 
   return found.text;
 }
 
-std::string FaustLines::expression(const Origin& line, const Token& token, int depth) {
+std::string SamLines::expression(const Origin& line, const Token& token, int depth) {
   std::string text;
-  std::vector<bool> delays;  // [open parenthesis]: that of a simpleStringTermDelay
+  std::vector<bool> delays;  // [open parenthesis] belongs to a simpleStringTermDelay
   for (Token rest = token; !rest.text.empty();) {
     const char c = rest.text[0];
     std::size_t length = 1;
@@ -349,8 +331,8 @@ std::string FaustLines::expression(const Origin& line, const Token& token, int d
       } else {
         error(line, word,
               "found " + quoted(word.text) +
-                  " where a number, a slider or a constant was expected; other FAUST code is not "
-                  "read" +
+                  " where a number, a slider or a constant was expected; other FAUST code is "
+                  "not supported" +
                   suggestion(word.text, parameters));
         return "0";
       }
@@ -369,21 +351,21 @@ std::string FaustLines::expression(const Origin& line, const Token& token, int d
     } else {
       error(line, {rest.text.substr(0, 1), rest.column},
             "found " + quoted(rest.text.substr(0, 1)) +
-                " in a number; FAUST code is not read, but for arithmetic");
+                " in a number; FAUST code is not supported, except arithmetic");
       return "0";
     }
     rest = behind(rest, length);
     if (text.size() > longest_expression) {
-      break;  // which tidy() tells
+      break;  // tidy() reports it
     }
   }
   return tidy(line, token, text);
 }
 
-std::string FaustLines::tidy(const Origin& line, const Token& token, const std::string& text) {
+std::string SamLines::tidy(const Origin& line, const Token& token, const std::string& text) {
   spent_ += text.size();
   if (text.size() > longest_expression || spent_ > max_model_bytes) {
-    error(line, token, "with all definitions put in, this is too long to be read");
+    error(line, token, "with all definitions inserted, this expression is too long");
     return "0";
   }
   const auto formula = parse_expression(text, parameters);
@@ -396,13 +378,13 @@ std::string FaustLines::tidy(const Origin& line, const Token& token, const std::
   }
   const double number = evaluate(*formula, {});
   if (!std::isfinite(number)) {
-    error(line, token, quoted(token.text) + " is no finite number");
+    error(line, token, quoted(token.text) + " is not a finite number");
     return "0";
   }
   return print_number(number);
 }
 
-double FaustLines::value(const std::string& text) const {
+double SamLines::value(const std::string& text) const {
   const auto formula = parse_expression(text, parameters);
   return formula ? evaluate(*formula, values) : 0.0;
 }
