@@ -12,7 +12,7 @@
 namespace ressort::model {
 namespace {
 
-// Looks at the arguments of one element after the other, for find_invalid_number().
+// Checks the arguments of all elements, for find_invalid_number().
 class NumberCheck {
  public:
   NumberCheck(const Network& network, std::span<const double> parameters, double rate_ratio)
@@ -85,14 +85,14 @@ class NumberCheck {
       const bool is_wrong = is_wrong_[asked.argument];
       const bool divides = asked.quantity == "mass" || asked.quantity == "impedance";
       if (is_wrong || (divides && is_nothing_[asked.argument])) {
-        error_ = {told(asked, std::string(element.name),
-                       is_wrong ? " is no finite number" : " is not above 0"),
-                  element.location.line, element.location.column};
+        error_ = {
+            told(asked, std::string(element.name), is_wrong ? " is not finite" : " is not above 0"),
+            element.location.line, element.location.column};
       }
     }
   }
 
-  // A mode that does not swing, or never ends, is none.
+  // Checks that the frequency and T60 of a mode are above 0.
   void look_above_zero(const BodyMode& mode) {
     for (const Asked& asked : {Asked{"frequency", mode.frequency_hz}, Asked{"T60", mode.t60_s}}) {
       if (!error_ && !(argument_value(network_, asked.argument, parameters_) > 0.0)) {
@@ -102,7 +102,7 @@ class NumberCheck {
     }
   }
 
-  // The stiffness that keeps a mode's frequency and T60 is a number.
+  // Checks that the stiffness of a mode is finite.
   void look_in_range(const BodyMode& mode) {
     const double hz = argument_value(network_, mode.frequency_hz, parameters_);
     const double t60_s = argument_value(network_, mode.t60_s, parameters_);
@@ -117,7 +117,7 @@ class NumberCheck {
     look_at({"T60", mode.t60_s}, 1.0 / t60_s, " is too short");
   }
 
-  // "the argument 1/P of 'r' is no finite number where P = 0"
+  // "the argument 1/P of 'r' is not finite when P = 0"
   std::string told(const Asked& asked, const std::string& name, std::string_view what) const {
     const Formula& formula = network_.arguments[asked.argument];
     std::vector<std::string> names;
@@ -129,8 +129,8 @@ class NumberCheck {
       if (std::any_of(formula.begin(), formula.end(), [&](const Step& step) {
             return step.op == Op::parameter && step.index == i;
           })) {
-        values += (values.empty() ? " where " : " and ") + names[i] + " = " +
-                  print_number(parameters_[i]);
+        values +=
+            (values.empty() ? " when " : " and ") + names[i] + " = " + print_number(parameters_[i]);
       }
     }
     return "the " + std::string(asked.quantity) + " " + print_expression(formula, names) +
@@ -139,9 +139,9 @@ class NumberCheck {
 
   const Network& network_;
   const std::span<const double> parameters_;
-  const double grown_;            // what the rate makes of a stiffness
+  const double grown_;            // factor of a stiffness at the sample rate
   std::vector<bool> is_wrong_;    // [argument]
-  std::vector<bool> is_nothing_;  // [argument] if it is a mass
+  std::vector<bool> is_nothing_;  // [argument] has no finite inverse
   std::optional<Error> error_;
 };
 

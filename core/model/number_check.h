@@ -1,4 +1,4 @@
-// core/model: whether the numbers that a model comes to are numbers.
+// core/model: checks that the numbers of a model are finite.
 #pragma once
 
 #include <optional>
@@ -9,9 +9,9 @@
 
 namespace ressort::model {
 
-// The first element, in the order of the network, of which an argument is no finite number with
-// these values of the parameters, or which weighs nothing; with its line. What an audio input gives
-// is not looked at. O(n). [any thread but audio]
+// Returns an error for the first element with an argument that is not finite with these parameters,
+// or with a mass that is not above 0. Ignores arguments that audio inputs set. O(n). [any thread
+// but audio]
 std::optional<Error> find_invalid_number(const Network& network, std::span<const double> parameters,
                                double rate_ratio);
 

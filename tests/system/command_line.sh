@@ -271,7 +271,7 @@ expect 2 "cannot be written too" "$program" render PolyTriangle -o bad.score --s
 expect 2 "word.mdl' is the name of no sound file; these are written: .wav, .w64, .flac, .ogg" \
   "$program" render PolyTriangle -o word.mdl
 expect 2 "must be -120 to 60, found nan" "$program" play -g nan
-expect 2 "no finite number" "$program" check infinite.mdl
+expect 2 "not a finite number" "$program" check infinite.mdl
 model wrong.score '0.0 /in/7/force 1\n'
 expect 2 "wrong.score:1:5: error: /in/7/force" \
   "$program" render PolyTriangle -o out.wav --score wrong.score
@@ -403,7 +403,7 @@ expect 0 "wild.mdl:3:1: warning: unstable: the stiffness 5 of 'r'" \
 expect 2 "wild.mdl:3:1: error: unstable" "$program" play wild.mdl -a dummy -i
 # All commands give the same answer.
 model zero.mdl '@P param 0\n@g ground 0.\n@m mass 1. 0. 0.\n@r spring @g @m 1/P\n@out1 posOutput @m\n'
-expect 2 "zero.mdl:4:1: error: the argument 1/P of 'r' is no finite number where P = 0" \
+expect 2 "zero.mdl:4:1: error: the argument 1/P of 'r' is not finite when P = 0" \
   "$program" check zero.mdl
 for refused in wild.mdl zero.mdl light.mdl two.toml target.toml; do
   "$program" check $refused 2>&1 > checked.out | grep error: > checked

@@ -28,7 +28,7 @@ constexpr std::array<Figure, 3> figures{{
     {"silence", &Budget::silence_db, -200.0, -20.0, "-200 to -20 (dB)"},
 }};
 
-// Takes one "word=value"; what is wrong with it, or nothing.
+// Reads one "word=value". Returns an error message or "".
 std::string take(Budget& budget, std::string_view item) {
   const std::size_t equals = item.find('=');
   const std::string_view word = item.substr(0, equals);
@@ -66,7 +66,7 @@ Result<Budget> parse_budget(std::string_view text) {
     const std::string_view item = text.substr(at, end - at);
     const std::string word = " " + std::string(item.substr(0, item.find('='))) + "=";
     std::string wrong = seen.find(word) == seen.npos ? take(budget, item)
-                                                     : "'" + word.substr(1) + "' is there twice";
+                                                     : "'" + word.substr(1) + "' is given twice";
     if (!wrong.empty()) {
       return Error{std::move(wrong), 1, static_cast<int>(at) + 1};
     }

@@ -1,4 +1,4 @@
-// core/model: how much may be lost for speed, and what must not be.
+// core/model: error budgets for faster computation.
 #pragma once
 
 #include <limits>
@@ -11,32 +11,32 @@
 
 namespace ressort::model {
 
-// Whether links that could gain energy from the published scheme are computed by one that cannot.
+// Selects the links that are made passive because they could create energy in the published scheme.
 enum class Passivity {
-  always,  // all that no theorem covers as published, which is all that are not linear
-  never,   // as published, whatever comes of it
+  always,  // all that are not linear, which no stability theorem covers as published
+  never,   // none
 };
 
-// Without any figure the published scheme, sample by sample, for all that is linear. A figure asks
-// for the continuous network instead, no nearer than that.
+// Without any figure, linear parts follow the published scheme sample by sample. With one, they
+// follow the continuous network within that error.
 struct Budget {
   static constexpr double unlimited = std::numeric_limits<double>::infinity();
 
-  double cents = unlimited;        // that any partial may be off the continuous network's pitch
-  double t60_percent = unlimited;  // that any decay may be off the continuous network's
-  double silence_db = -unlimited;  // what is below this may be left out, against the peak of the
-                                   // unreduced output over its whole life; 0 dB: everything may
+  double cents = unlimited;  // largest error of a partial's pitch, against the continuous network
+  double t60_percent = unlimited;  // largest error of a decay time
+  double silence_db = -unlimited;  // parts below this level may be omitted, relative to the peak of
+                                   // the complete output over its whole duration
   Passivity passive = Passivity::always;
 
   bool is_physical() const { return cents < unlimited || t60_percent < unlimited; }
   bool operator==(const Budget&) const = default;
 };
 
-// "cents=3 t60=5 silence=-60 passive=always", in any order; each at most once. An error's column
-// is that in the text. [any thread but audio]
+// Parses "cents=3 t60=5 silence=-60 passive=always", in any order, each at most once. The column of
+// an error is relative to the text. [any thread but audio]
 Result<Budget> parse_budget(std::string_view text);
 
-// The same, back; "" for none.
+// Prints a budget; "" for the default.
 std::string print_budget(const Budget& budget);
 
 }  // namespace ressort::model

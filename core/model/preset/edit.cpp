@@ -33,7 +33,7 @@ std::string in_quotes(std::string_view text) {
   return quoted + "\"";
 }
 
-// A number that TOML does not take for a whole one.
+// Prints a number that TOML does not read as an integer.
 std::string in_toml(double number) {
   std::string text = print_number(number);
   return text.find_first_of(".e") == text.npos ? text + ".0" : text;
@@ -74,7 +74,7 @@ std::string print_control(const ControlSetting& control) {
   return text;
 }
 
-// A piece of the text, and what takes its place.
+// A range of the text and its replacement.
 struct Edit {
   std::size_t first = 0;
   std::size_t count = 0;
@@ -97,12 +97,12 @@ class Editor {
     edits_.push_back({first, offset(node.source().end) - first, text});
   }
 
-  // Whole lines, after the one that a node begins in.
+  // Inserts lines after the line in which a node begins.
   void insert_after(const toml::node& node, const std::string& lines) {
     edits_.push_back({line_start(node.source().begin.line + 1), 0, lines});
   }
 
-  // From a table's head to the next head.
+  // Removes the lines from a table's header to the next header.
   void remove_table(const toml::node& table) {
     std::size_t line = table.source().begin.line;
     const std::size_t first = line_start(line);
@@ -138,7 +138,7 @@ class Editor {
     const std::size_t first = text_.find_first_not_of(" \t", line_start(line));
     return first != text_.npos && text_[first] == '[';
   }
-  // Columns count characters of UTF-8, not bytes.
+  // Converts a position to an offset. Columns count UTF-8 characters, not bytes.
   std::size_t offset(const toml::source_position& position) const {
     std::size_t at = line_start(position.line);
     for (toml::source_index column = 1; column < position.column && at < text_.size(); ++column) {
@@ -150,11 +150,11 @@ class Editor {
   }
 
   std::string_view text_;
-  std::vector<std::size_t> starts_;  // of lines
+  std::vector<std::size_t> starts_;  // offsets of lines
   std::vector<Edit> edits_;
 };
 
-// Whether a row of the controls is driven by a controller that has learnt something else.
+// Returns true if a learned control replaces this row.
 bool is_replaced(const toml::node& row, const std::vector<ControlSetting>& learned) {
   const auto from =
       row.as_table() != nullptr ? row.as_table()->get_as<std::string>("from") : nullptr;
@@ -212,13 +212,12 @@ std::string edit(std::string_view text, const PresetChanges& changes) {
 
 Result<std::string> edit_preset(std::string_view toml, const PresetChanges& changes) {
   if (!parse_preset(toml).ok()) {
-    return Error{"it is no preset"};
+    return Error{"this is not a preset"};
   }
   std::string text = edit(toml, changes);
   const ParsedPreset written = parse_preset(text);
   if (!written.ok()) {
-    return Error{"the preset is written in a way that cannot be changed: " +
-                 written.errors.front().message};
+    return Error{"cannot change this preset: " + written.errors.front().message};
   }
   return text;
 }

@@ -1,5 +1,5 @@
-// core/model: presets as texts that are written: what a player has changed, in the text that was
-// loaded, or the whole of one that no text was loaded for.
+// core/model: writes presets: changes values in a preset's text, or prints a preset that has no
+// text.
 #pragma once
 
 #include <string>
@@ -12,21 +12,20 @@
 namespace ressort::model {
 
 struct PresetChanges {
-  std::string model;  // its name or path, as a preset at its new place needs it
+  std::string model;  // name or path of the model, relative to the new file
   double gain = 1.0;
-  std::vector<ParameterSetting> parameters;  // that differ, or that the text does not have
-  std::vector<ControlSetting> learned;       // each instead of all that its controller did
+  std::vector<ParameterSetting> parameters;  // changed or new
+  std::vector<ControlSetting> learned;       // each replaces all controls of its controller
 };
 
-// The same text but for that: comments and all keys stay. An error where it is no preset, or is
-// written in a way that cannot be changed. [any thread but audio]
+// Applies changes to a preset's text, and keeps its comments and all other keys. Fails if the text
+// is not a preset, or has a form that cannot be changed. [any thread but audio]
 Result<std::string> edit_preset(std::string_view toml, const PresetChanges& changes);
 
-// A text that reads as this preset, for one that was made up by default_preset(). [any thread but
-// audio]
+// Prints a preset made by default_preset(). [any thread but audio]
 std::string print_preset(const Preset& preset);
 
-// What drives a control, as a preset says it: "note", "cc71", "/finger".
+// Returns the source of a control as in a preset: "note", "cc71", "/finger".
 std::string source_name(const ControlSetting& control);
 
 }  // namespace ressort::model

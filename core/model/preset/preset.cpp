@@ -4,19 +4,212 @@
 #include <cctype>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
+#include <optional>
 
 #include "core/model/language/tokens.h"
-#include "core/model/preset/preset_morph.h"
-#include "core/model/preset/toml_depth.h"
-#include "core/model/preset/toml_table.h"
+#include "core/model/preset/toml.h"
 #include "core/model/topology.h"
 
 namespace ressort::model {
 namespace {
 
+SourceLocation location_of(const toml::node& node) {
+  return {static_cast<int>(node.source().begin.line), static_cast<int>(node.source().begin.column)};
+}
+
+// Reads values from one table and collects all errors. The readers return true if the value exists
+// and is valid.
+class TomlTable {
+ public:
+  TomlTable(const toml::table& table, std::string name, std::vector<Error>& errors)
+      : table_(table), name_(std::move(name)), errors_(errors) {}
+
+  // Reports keys that preset_keys() does not list for this table.
+  void allow(std::string_view table) {
+    for (const auto& [key, value] : table_) {
+      bool is_known = false;
+      std::string expected;
+      for (const PresetKey& known : preset_keys()) {
+        if (known.table == table) {
+          is_known |= known.key == key.str();
+          expected += (expected.empty() ? "" : ", ") + std::string(known.key);
+        }
+      }
+      if (!is_known) {
+        fail(value,
+             "unknown key " + quoted(key.str()) + " in " + name_ + "; there are " + expected);
+      }
+    }
+  }
+
+  bool number(std::string_view key, double& target, double least, double most) {
+    const toml::node* node = table_.get(key);
+    return node != nullptr && number(*node, key, target, least, most);
+  }
+
+  void integer(std::string_view key, int& target, int least, int most) {
+    double value = target;
+    if (number(key, value, least, most) && value != std::floor(value)) {
+      fail(*table_.get(key), "'" + std::string(key) + "' must be a whole number");
+    }
+    target = static_cast<int>(value);
+  }
+
+  bool text(std::string_view key, std::string& target) {
+    return take(key, target, "a text in quotes");
+  }
+  bool flag(std::string_view key, bool& target) { return take(key, target, "true or false"); }
+
+  // Reads [low, high].
+  bool pair(std::string_view key, double& low, double& high, double least = -1e12,
+            double most = 1e12) {
+    const toml::node* node = table_.get(key);
+    if (node == nullptr) {
+      return false;
+    }
+    const toml::array* both = node->as_array();
+    if (both == nullptr || both->size() != 2) {
+      return fail(*node, "'" + std::string(key) + "' must be two numbers: [low, high]");
+    }
+    const bool is_first = number((*both)[0], key, low, least, most);
+    return number((*both)[1], key, high, least, most) && is_first;
+  }
+  // Reads [low, high] and checks their order.
+  bool range(std::string_view key, double& low, double& high, double least = -1e12,
+             double most = 1e12) {
+    if (!pair(key, low, high, least, most)) {
+      return false;
+    }
+    return low <= high ||
+           fail(*table_.get(key), "'" + std::string(key) +
+                                      "' is the wrong way round: write the lower number "
+                                      "first, [low, high]");
+  }
+
+  const toml::node* get(std::string_view key) const { return table_.get(key); }
+
+  // Adds an error; returns false.
+  bool fail(const toml::node& node, std::string message) {
+    return fail(location_of(node), std::move(message));
+  }
+  bool fail(SourceLocation location, std::string message) {
+    errors_.push_back({std::move(message), location.line, location.column});
+    return false;
+  }
+
+ private:
+  bool number(const toml::node& node, std::string_view key, double& target, double least,
+              double most) {
+    const auto value = node.value<double>();
+    if (!value || node.is_boolean() || !std::isfinite(*value)) {
+      return fail(node, "'" + std::string(key) + "' must be a number");
+    }
+    if (*value < least || *value > most) {
+      char range[80];
+      std::snprintf(range, sizeof range, "must lie between %g and %g", least, most);
+      return fail(node, "'" + std::string(key) + "' " + range);
+    }
+    target = *value;
+    return true;
+  }
+
+  template <class T>
+  bool take(std::string_view key, T& target, std::string_view expected) {
+    const toml::node* node = table_.get(key);
+    if (node == nullptr) {
+      return false;
+    }
+    if (!node->is<T>()) {
+      return fail(*node, "'" + std::string(key) + "' must be " + std::string(expected));
+    }
+    target = *node->value<T>();
+    return true;
+  }
+
+  const toml::table& table_;
+  std::string name_;
+  std::vector<Error>& errors_;
+};
+
+inline constexpr int deepest_toml = 8;  // nested brackets, or dots in a key
+
+// Returns the offset after the string that starts at `at`. A string that is never closed ends with
+// its line, or with the text if it is a multi-line string.
+std::size_t end_of_string(std::string_view text, std::size_t at) {
+  const char quote = text[at];
+  const std::string_view triple = quote == '"' ? "\"\"\"" : "'''";
+  const bool is_long = text.substr(at).starts_with(triple);
+  at += is_long ? 3 : 1;
+  while (at < text.size()) {
+    if (text[at] == '\\' && quote == '"') {
+      at += 2;
+    } else if (!is_long && (text[at] == quote || text[at] == '\n')) {
+      return text[at] == quote ? at + 1 : at;
+    } else if (is_long && text.substr(at).starts_with(triple)) {
+      at += 3;
+      // Up to two more quotes belong to the string.
+      for (int more = 0; more < 2 && at < text.size() && text[at] == quote; ++more) {
+        ++at;
+      }
+      return at;
+    } else {
+      ++at;
+    }
+  }
+  return text.size();
+}
+
+// Returns an error if arrays, inline tables, headers or dotted keys are nested too deeply: toml++
+// is recursive and does not limit dotted keys, so such a text could overflow the stack. O(n).
+std::optional<Error> too_deep(std::string_view toml) {
+  int open = 0;
+  int dots = 0;
+  for (std::size_t at = 0; at < toml.size(); ++at) {
+    switch (toml[at]) {
+      case '"':
+      case '\'':
+        at = end_of_string(toml, at) - 1;
+        continue;
+      case '#':
+        at = std::min(toml.find('\n', at), toml.size()) - 1;
+        continue;
+      case '[':
+      case '{':
+        ++open;
+        dots = 0;
+        break;
+      case ']':
+      case '}':
+        open = std::max(0, open - 1);
+        dots = 0;
+        break;
+      case '\n':
+      case '=':
+      case ',':
+        dots = 0;
+        break;
+      case '.':
+        ++dots;
+        break;
+      default:
+        break;
+    }
+    if (open > deepest_toml || dots > deepest_toml) {
+      const std::string_view before = toml.substr(0, at);
+      const std::size_t line_start = before.rfind('\n') + 1;  // 0 on the first line
+      return Error{"this is nested more than " + std::to_string(deepest_toml) +
+                       " levels deep; a preset needs 3",
+                   static_cast<int>(std::count(before.begin(), before.end(), '\n')) + 1,
+                   static_cast<int>(at - line_start) + 1};
+    }
+  }
+  return std::nullopt;
+}
+
 using IsReserved = bool (*)(std::string_view address);
 
-// "position, pluck, bow, impulse, hold or parameter"
+// Returns "position, pluck, bow, impulse, hold or parameter".
 std::string words_for_how() {
   std::string words;
   for (const GestureRow& row : gestures) {
@@ -53,7 +246,7 @@ void read_parameter(std::string name, const toml::node& node, Preset& preset,
   preset.parameters.push_back(std::move(setting));
 }
 
-// Whether a message, or a line of a score, can have this address.
+// Returns true for a valid OSC address.
 bool is_address(std::string_view text) {
   constexpr std::size_t longest = 255;
   return text.size() > 1 && text.size() <= longest && text[0] == '/' &&
@@ -63,7 +256,7 @@ bool is_address(std::string_view text) {
          });
 }
 
-// "note", "pressure", "cc1", "audio2", "/name"
+// Reads "note", "pressure", "cc1", "audio2" or "/name".
 bool read_source(std::string_view text, ControlSetting& control) {
   const auto numbered = [&](std::string_view prefix, int least, int most) {
     if (!text.starts_with(prefix)) {
@@ -94,7 +287,7 @@ bool read_source(std::string_view text, ControlSetting& control) {
   return true;
 }
 
-// Without a word the target tells: an input is moved, a parameter is turned.
+// Returns the gesture of a control without `how`: it moves an input or sets a parameter.
 Gesture usual_gesture(std::string_view target) {
   return target.starts_with("in") && target.size() > 2 &&
                  std::isdigit(static_cast<unsigned char>(target[2])) != 0
@@ -102,7 +295,7 @@ Gesture usual_gesture(std::string_view target) {
              : Gesture::parameter;
 }
 
-// "round_robin = [1, 2]"
+// Reads "round_robin = [1, 2]".
 void read_round_robin(TomlTable& reader, ControlSetting& control) {
   constexpr double most_turns = 16.0;
   double turn = control.turn;
@@ -113,7 +306,7 @@ void read_round_robin(TomlTable& reader, ControlSetting& control) {
   if (turn != std::floor(turn) || turns != std::floor(turns)) {
     reader.fail(*reader.get("round_robin"), "'round_robin' must be two whole numbers: [1, 2]");
   } else if (control.source != ControlSource::note) {
-    reader.fail(*reader.get("round_robin"), "'round_robin' is for notes");
+    reader.fail(*reader.get("round_robin"), "'round_robin' is for notes only");
   }
   control.turn = static_cast<int>(turn);
   control.turns = static_cast<int>(turns);
@@ -134,12 +327,12 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
   }
   if (control.source == ControlSource::osc && !is_address(control.address)) {
     reader.fail(*table.get("from"),
-                "an OSC name has 2 to 255 characters: '/', then letters, digits and signs, but no "
-                "blanks and none of # * , ? [ ] { }");
+                "an OSC name has 2 to 255 characters: '/', then letters, digits and signs except "
+                "blanks and # * , ? [ ] { }");
   } else if (control.source == ControlSource::osc && is_reserved != nullptr &&
              is_reserved(control.address)) {
     reader.fail(*table.get("from"), quoted(control.address) +
-                                        " is an address of the program's own; choose another, such "
+                                        " is reserved by ressort; choose another name, such "
                                         "as \"/finger\"");
   }
   if ((reader.text("to", control.target) || table.get("to") == nullptr) && control.target.empty()) {
@@ -160,11 +353,11 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
   const bool has_travel = reader.number("travel", control.travel, 0.0, 1e12);
   control.has_level = reader.pair("level_db", control.low_db, control.high_db, -120.0, 40.0);
   if (control.has_level && control.gesture == Gesture::parameter) {
-    reader.fail(*table.get("level_db"), "'level_db' is for what plays an input, not a parameter");
+    reader.fail(*table.get("level_db"), "'level_db' is for controls of inputs, not of parameters");
   }
   if (reader.pair("length_ms", control.longest_ms, control.shortest_ms, 0.0, 1e3) &&
       control.gesture != Gesture::impulse && control.gesture != Gesture::swing) {
-    reader.fail(*table.get("length_ms"), "'length_ms' is for an impulse or a swing");
+    reader.fail(*table.get("length_ms"), "'length_ms' is for impulses and swings only");
   }
   double lowest = 0.0;
   double highest = 127.0;
@@ -201,7 +394,7 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
   }
 }
 
-// "channels = [1, 2]"
+// Reads "channels = [1, 2]".
 void read_channels(const toml::node& node, TomlTable& reader, Preset& preset) {
   const toml::array* const channels = node.as_array();
   if (channels == nullptr || channels->empty()) {
@@ -219,17 +412,17 @@ void read_channels(const toml::node& node, TomlTable& reader, Preset& preset) {
   }
 }
 
-// What the points of a curve are made of.
+// Texts and limits for the points of a curve.
 struct CurveWords {
   const char* name;
   const char* example;
-  const char* point;  // what its two numbers are
+  const char* point;  // meaning of its two numbers
   double least[2];
   double most[2];
   const char* bounds;
 };
 
-// "velocity = [[0, 10], [127, 127]]": whose first numbers ascend.
+// Reads "velocity = [[0, 10], [127, 127]]". The first numbers must ascend.
 void read_points(const toml::array& rows, TomlTable& reader, const CurveWords& words,
                  std::vector<CurvePoint>& points) {
   constexpr std::size_t most_points = 16;
@@ -280,7 +473,7 @@ void read_velocity_points(const toml::array& rows, TomlTable& reader, Preset& pr
   }
 }
 
-// A number, or one for each of some keys.
+// Reads a number, or points of keys and numbers.
 void read_by_key(const toml::table& root, TomlTable& reader, const CurveWords& words,
                  std::vector<CurvePoint>& points) {
   if (const toml::node* node = root.get(words.name); node != nullptr && node->is_array()) {
@@ -290,7 +483,7 @@ void read_by_key(const toml::table& root, TomlTable& reader, const CurveWords& w
   }
 }
 
-// How keys are tuned and what they do.
+// Reads the keys for tuning and playing.
 void read_keys(const toml::table& root, TomlTable& reader, Preset& preset) {
   reader.number("a4_hz", preset.a4_hz, 220.0, 880.0);
   reader.number("glide_s", preset.glide_s, 0.0, 60.0);
@@ -326,7 +519,65 @@ void read_keys(const toml::table& root, TomlTable& reader, Preset& preset) {
   }
 }
 
-// ["a", "b"]: texts that are as `is_right` says, up to so many.
+MorphSetting read_values(const toml::table& table, std::vector<Error>& errors) {
+  MorphSetting stop{.location = location_of(table)};
+  TomlTable reader(table, "a stop of the morph", errors);
+  for (const auto& [key, node] : table) {
+    const std::string name(key.str());
+    ParameterSetting setting{.name = name, .location = location_of(node)};
+    if (name == "gain") {
+      reader.number(name, stop.gain, 1e-9, 1e9);
+    } else if (reader.number(name, setting.value, -1e12, 1e12)) {
+      setting.minimum = setting.maximum = setting.value;
+      stop.values.push_back(std::move(setting));
+    }
+  }
+  return stop;
+}
+
+void read_morph(const toml::node& node, Preset& preset, std::vector<Error>& errors) {
+  const toml::table* const table = node.as_table();
+  if (table == nullptr) {
+    const SourceLocation place = location_of(node);
+    errors.push_back({"'morph' must be a table: [morph]", place.line, place.column});
+    return;
+  }
+  TomlTable reader(*table, "a morph", errors);
+  reader.allow("morph");
+  if (!reader.text("parameter", preset.morph_parameter) || !is_identifier(preset.morph_parameter)) {
+    reader.fail(node, "a morph needs the name of its parameter: parameter = \"morph\"");
+  }
+  const toml::node* const through = table->get("through");
+  const toml::array* const stops = through != nullptr ? through->as_array() : nullptr;
+  if (stops == nullptr || stops->size() < 2 || stops->size() > most_morph_stops) {
+    reader.fail(through != nullptr ? *through : node,
+                "a morph needs 2 to 16 stops: through = [\"Soft\", "
+                "{ m_K = 0.1 }]");
+    return;
+  }
+  for (const toml::node& stop : *stops) {
+    if (const toml::table* const values = stop.as_table()) {
+      preset.morph.push_back(read_values(*values, errors));
+    } else if (const auto name = stop.value<std::string>(); name && !name->empty()) {
+      preset.morph.push_back({.preset = *name, .location = location_of(stop)});
+    } else {
+      reader.fail(stop, "a stop of a morph is the name of a preset or a table of values");
+    }
+  }
+  for (const MorphSetting& stop : preset.morph) {
+    for (const ParameterSetting& value : stop.values) {
+      for (const ParameterSetting& knob : preset.parameters) {
+        if (knob.name == value.name) {
+          reader.fail(value.location, quoted(value.name) +
+                                          " is also in [parameters], so the morph cannot change "
+                                          "it; remove one of the two");
+        }
+      }
+    }
+  }
+}
+
+// Reads up to `most` texts for which `is_right` returns true: ["a", "b"].
 void read_texts(std::string_view key, const toml::node& node, TomlTable& reader,
                 std::vector<std::string>& target, std::size_t most, const std::string& what,
                 bool (*is_right)(std::string_view)) {
@@ -363,7 +614,7 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
   }
   constexpr std::size_t longest_path = 4096;
   if (preset.model.size() > longest_path) {
-    reader.fail(preset.model_location, "'model' is longer than any file's path");
+    reader.fail(preset.model_location, "'model' is longer than a path may be");
     preset.model.clear();
   } else if (!preset.model.empty() && !preset.model.ends_with(".mdl")) {
     reader.fail(preset.model_location, "'model' must be the name of a .mdl file");
@@ -426,10 +677,9 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
     }
   }
   if (!preset.keyboard && !preset.keys_db.empty()) {
-    reader.fail(
-        *root.get("keys_db"),
-        "'keys_db' is for keys that are notes of their own, and with tuning = \"fixed\" all "
-        "of them play one");
+    reader.fail(*root.get("keys_db"),
+                "'keys_db' has no effect with tuning = \"fixed\", where all keys play the same "
+                "note; remove one of them");
   }
   if (std::string motion; reader.text("motion", motion)) {
     if (motion == "velocity") {
@@ -455,7 +705,7 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
   if (const toml::node* node = root.get("control")) {
     const toml::array* rows = node->as_array();
     if (rows == nullptr || !rows->is_homogeneous<toml::table>()) {
-      reader.fail(*node, "controls are written one by one: [[control]]");
+      reader.fail(*node, "write each control as a table of its own: [[control]]");
     } else {
       for (const toml::node& row : *rows) {
         read_control(*row.as_table(), preset, errors, is_reserved);
@@ -490,7 +740,7 @@ ParsedPreset parse_preset(std::string_view text, IsReserved is_reserved) {
     return std::pair(a.line, a.column) < std::pair(b.line, b.column);
   });
   if (read.errors.size() > most_preset_errors) {
-    read.errors[most_preset_errors].message = "too many problems; those after this are not told";
+    read.errors[most_preset_errors].message = "too many errors; stopping here";
     read.errors.resize(most_preset_errors + 1);
   }
   return read;

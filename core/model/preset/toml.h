@@ -1,4 +1,4 @@
-// core/model: toml++, as every file of ours has to include it.
+// core/model: includes toml++ with our settings. Do not include it directly.
 #pragma once
 
 #define TOML_EXCEPTIONS 0
@@ -7,9 +7,9 @@
 #else
 #include <toml++/impl/preprocessor.h>
 #endif
-// toml++ asserts, or in a release build promises the compiler, what any text can break: that a
-// header's first letter starts a key, that no character lies between two others. The parser goes
-// on to report such text as an error; so nothing is asserted, and the answer is no.
+// Some assertions of toml++ fail for invalid texts, for example if a header does not start with a
+// key; in release builds they are assumptions of the optimiser. The parser reports such texts as
+// errors anyway, so the assertions are disabled and unreachable code returns false.
 #undef TOML_ASSERT_ASSUME
 #define TOML_ASSERT_ASSUME(expression) static_assert(true)
 #pragma push_macro("TOML_UNREACHABLE")

@@ -31,7 +31,7 @@ TEST_CASE("A preset that names a missing input or parameter is refused with its 
   CHECK(error.message == "the model has no input 'in2'; it has 1");
   error = error_of(scenes::poly_triangle(),
                    "[[control]]\nfrom = \"note\"\nto = \"in1\"\nhow = \"bow\"");
-  CHECK(error.message == "'in1' is a force input, which this gesture cannot play");
+  CHECK(error.message == "'in1' is a force input, but this gesture needs a position input");
   // The engine has an audio channel for each input.
   error = error_of(model, "[[control]]\nfrom = \"audio1\"\nto = \"m_K\"");
   CHECK(error.message == "an audio channel drives an input, not a parameter");

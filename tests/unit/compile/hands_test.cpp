@@ -103,7 +103,7 @@ TEST_CASE("A range in swings needs a contact or a pluck", "[hands]") {
         "'unit' must be position or swing");
   CHECK(complaint("@m mass 1. 0. 0.\n@g ground 0.\n@in2 posInput 0.\n@a spring @m @g 0.1 0.\n"
                   "@b spring @in2 @m 0.1 0.\n@out1 posOutput @m\n",
-                  hand) == "'in2' touches nothing: a swing needs a contact or a pluck there");
+                  hand) == "'in2' has no contact or pluck, so its range cannot be in swings");
 }
 
 }  // namespace ressort::hands_test

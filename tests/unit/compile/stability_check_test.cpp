@@ -87,22 +87,22 @@ TEST_CASE("An argument that is not finite is refused with its element, line and 
     return said_to(text, {.bare = true, .force = true, .settings = settings});
   };
   CHECK(said("@P param 0\n" + ground + "@r spring @g @m 1/P\n") ==
-        "there.mdl:4:1: error: the argument 1/P of 'r' is no finite number where P = 0");
+        "there.mdl:4:1: error: the argument 1/P of 'r' is not finite when P = 0");
   CHECK(said("@P param 2\n" + ground + "@r spring @g @m 1/P\n") == "");
   CHECK(said("@P param 2\n" + ground + "@r spring @g @m 1/P\n", {{"P", 0.0}}) ==
-        "there.mdl:4:1: error: the argument 1/P of 'r' is no finite number where P = 0");
+        "there.mdl:4:1: error: the argument 1/P of 'r' is not finite when P = 0");
   CHECK(said("@P param 0\n@Q param 3\n  @o osc Q*P 0.1 0 0 0\n") ==
-        "there.mdl:3:3: error: the mass Q*P of 'o' is not above 0 where P = 0 and Q = 3");
+        "there.mdl:3:3: error: the mass Q*P of 'o' is not above 0 when P = 0 and Q = 3");
   CHECK(said("@P param 900\n@o osc 1 0.1 exp(P) 0 0\n") ==
-        "there.mdl:2:1: error: the damping exp(P) of 'o' is no finite number where P = 900");
+        "there.mdl:2:1: error: the damping exp(P) of 'o' is not finite when P = 900");
   CHECK(said("@P param 0\n@s string 9 1 0.1 1/P 0 0\n") ==
-        "there.mdl:2:1: error: the damping 1/P of 's' is no finite number where P = 0");
+        "there.mdl:2:1: error: the damping 1/P of 's' is not finite when P = 0");
   CHECK(said("@P param 0\n@s string 9 1 0.1 0 0 0\n@out1 posOutput [@s 1/P]\n") ==
-        "there.mdl:3:17: error: the place 1/P is no finite number where P = 0");
+        "there.mdl:3:17: error: the place 1/P is not finite when P = 0");
   // At a lower rate the stiffness grows. The values of an audio input are unknown.
   CHECK(said_to(ground + "@r spring @g @m 1e308\n", {.rate_hz = 8000.0, .force = true}) ==
         "there.mdl:3:1: error: the argument " + std::string("1e308") +
-            " of 'r' is no finite number");
+            " of 'r' is not finite");
   CHECK(compile_network(network_of("@K audioParam @in1\n@o osc 1 1/K 0 0 0\n"), {}, {}));
 }
 

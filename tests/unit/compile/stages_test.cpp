@@ -46,7 +46,7 @@ TEST_CASE("A formula that is not finite is reported at its line", "[stages]") {
   CHECK_FALSE(find_invalid_number(network, std::vector{1.0}, 1.0));
   const auto error = find_invalid_number(network, std::vector{0.0}, 1.0);
   REQUIRE(error);
-  CHECK(error->message == "the stiffness 1/P of 'o' is no finite number where P = 0");
+  CHECK(error->message == "the stiffness 1/P of 'o' is not finite when P = 0");
   CHECK(error->line == 2);
   // At half the rate stiffness is four times as large.
   CHECK_FALSE(find_invalid_number(network, std::vector{1e-308}, 1.0));

@@ -21,7 +21,7 @@ const std::string bell =
 
 }  // namespace
 
-TEST_CASE("a body is its modes and its places", "[body]") {
+TEST_CASE("a body consists of modes and places", "[body]") {
   const Network network = network_of(bell);
   REQUIRE(network.macros.size() == 1);
   CHECK(network.macros[0].kind == MacroKind::body);
@@ -32,7 +32,7 @@ TEST_CASE("a body is its modes and its places", "[body]") {
   CHECK(network.modes[1].shape == std::vector<double>{0.8, 0.35, 0.9});
 }
 
-TEST_CASE("modes of one body may stand anywhere, and come to it", "[body]") {
+TEST_CASE("modes of a body may be anywhere in the text", "[body]") {
   const Network network = network_of(
       "@out1 posOutput [@b x]\n@b1 mode @b 3. 1. 1.\n@a1 mode @a 1. 1. 1.\n@b2 mode @b 4. 1. 1.\n"
       "@a body 1. y\n@b body 1. x\n@a2 mode @a 2. 1. 1.\n");
@@ -58,7 +58,7 @@ TEST_CASE("a mode is an oscillator of its body's mass", "[body]") {
   CHECK(network.shapes == std::vector<double>{1.0, 0.8, -0.61, 0.35, 0.02, 0.9});
 }
 
-TEST_CASE("a place on a body has a name, or is between two", "[body]") {
+TEST_CASE("a place on a body is named or lies between two named places", "[body]") {
   const auto place = [](const std::string& written) {
     const Network network =
         network_of("@u param 0.1\n" + bell + "@out2 posOutput [@bell " + written + "]\n");
@@ -72,7 +72,7 @@ TEST_CASE("a place on a body has a name, or is between two", "[body]") {
   CHECK(place("1-u") == Approx(0.9));
 }
 
-TEST_CASE("what is wrong about a body is told", "[body]") {
+TEST_CASE("errors in bodies are reported", "[body]") {
   check_error("@b body 1. x\n@out1 posOutput [@b x]\n", 1, 1,
               "the body '@b' has no modes: each is a line like '@b_1 mode @b 440. 2. 1.'");
   check_error(bell + "@b3 mode @bell 800. 1. 0.5 0.5\n", 5, 28,
@@ -100,7 +100,7 @@ TEST_CASE("what is wrong about a body is told", "[body]") {
               "no digit");
 }
 
-TEST_CASE("bodies are printed as they are read", "[body]") {
+TEST_CASE("printed bodies read back unchanged", "[body]") {
   const std::string text =
       "@p param 2\n@b body [1 + p] x y z\n@m1 mode @b 100*p 1/p -1 0.5 [1 / 3]\n"
       "@in1 frcInput [@b x]\n@l contact [@b p/4] [@b z] 1 0.1\n@out1 posOutput [@b 0.25]\n";

@@ -6,7 +6,7 @@
 
 namespace ressort::budget_test {
 
-TEST_CASE("a budget is read, and printed back", "[budget]") {
+TEST_CASE("a printed budget reads back unchanged", "[budget]") {
   const auto budget = parse_budget("  silence=-60 cents=3  t60=2.5 passive=always ");
   REQUIRE(budget);
   CHECK(budget->cents == 3.0);
@@ -21,7 +21,7 @@ TEST_CASE("a budget is read, and printed back", "[budget]") {
   CHECK_FALSE(Budget{}.is_physical());
 }
 
-TEST_CASE("what is wrong with a budget is told with its place", "[budget]") {
+TEST_CASE("errors in a budget have a column", "[budget]") {
   struct Case {
     const char* text;
     int column;
@@ -36,7 +36,7 @@ TEST_CASE("what is wrong with a budget is told with its place", "[budget]") {
         Case{"t60=nan", 1, "'t60' must be above 0, up to 100 (%), found 'nan'"},
         Case{"silence=-10", 1, "'silence' must be -200 to -20 (dB), found '-10'"},
         Case{"passive=yes", 1, "'passive' must be auto, always or never, found 'yes'"},
-        Case{"t60=1 t60=2", 7, "'t60=' is there twice"}}) {
+        Case{"t60=1 t60=2", 7, "'t60=' is given twice"}}) {
     const auto budget = parse_budget(c.text);
     REQUIRE_FALSE(budget);
     CHECK(budget.error().message == c.message);

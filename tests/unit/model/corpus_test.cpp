@@ -216,7 +216,7 @@ void check_same(const Network& network, const ChannelSamples& expected,
 
 }  // namespace
 
-TEST_CASE("every model of the corpus is read as what it says", "[corpus]") {
+TEST_CASE("every model of the corpus is read as described", "[corpus]") {
   for (const Model& model : models) {
     INFO(model.name);
     const ParsedNetwork parsed = parse_network(text_of(model.name));
@@ -244,7 +244,7 @@ TEST_CASE("every model of the corpus is read as what it says", "[corpus]") {
   }
 }
 
-TEST_CASE("every model of the corpus sounds as the textbook has it", "[corpus]") {
+TEST_CASE("every model of the corpus follows its analytic solution", "[corpus]") {
   for (const Model& model : models) {
     INFO(model.name);
     const Network network = support::network_of(text_of(model.name));

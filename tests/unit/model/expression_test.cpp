@@ -79,7 +79,7 @@ TEST_CASE("parameters and functions", "[expression]") {
   CHECK_FALSE(is_constant(*varying));
 }
 
-TEST_CASE("what is no expression is told, with its column", "[expression]") {
+TEST_CASE("errors in expressions have a column", "[expression]") {
   const std::string expected = "where a number, a name or '(' was expected";
   check_error("", 1, "the expression ends " + expected);
   check_error("1+", 3, "the expression ends " + expected);
@@ -90,19 +90,19 @@ TEST_CASE("what is no expression is told, with its column", "[expression]") {
   check_error("1,2", 2, "found ',' where an operator or the end was expected");
   check_error("(1+2", 5, "expected ')'");
   check_error("1)", 2, "found ')' where an operator or the end was expected");
-  check_error("2*P", 3, "'P' is no parameter of this model");
-  check_error("nan", 1, "'nan' is no parameter of this model");
-  check_error("inf+1", 1, "'inf' is no parameter of this model");
+  check_error("2*P", 3, "'P' is not a parameter of this model");
+  check_error("nan", 1, "'nan' is not a parameter of this model");
+  check_error("inf+1", 1, "'inf' is not a parameter of this model");
   check_error("1+tan(2)", 3,
-              "unknown function 'tan'; there are sqrt abs sin cos exp pow min max clamp");
+              "unknown function 'tan'; known functions: sqrt abs sin cos exp pow min max clamp");
   check_error("pow(1)", 6, "expected ',': pow takes 2 arguments");
   check_error("sqrt(1,2)", 7, "expected ')' after the arguments of sqrt");
-  check_error("sqrt", 1, "'sqrt' is no parameter of this model");
+  check_error("sqrt", 1, "'sqrt' is not a parameter of this model");
   check_error("1e400", 1, "the number is too large or too small");
   check_error("2*1e-400", 3, "the number is too large or too small");
 }
 
-TEST_CASE("no expression is too deep or too long for the machine that runs it", "[expression]") {
+TEST_CASE("expressions that are too deep or too long are rejected", "[expression]") {
   CHECK(value(repeated("(", 32) + "1" + repeated(")", 32)) == 1.0);
   check_error(repeated("(", 33) + "1" + repeated(")", 33), 34,
               "the parentheses are nested too deeply");
@@ -119,7 +119,7 @@ TEST_CASE("no expression is too deep or too long for the machine that runs it", 
   CHECK_FALSE(parse_expression(repeated("(", 1000000), names));
 }
 
-TEST_CASE("numbers are read and written free of the locale, and come back the same",
+TEST_CASE("numbers are read and printed independently of the locale, without loss",
           "[expression]") {
   const std::vector<std::pair<std::string, double>> good = {
       {"1", 1},       {"1.", 1},       {".1", .1}, {"-0.2", -.2},   {"+3", 3},
@@ -152,7 +152,7 @@ TEST_CASE("numbers are read and written free of the locale, and come back the sa
   CHECK(print_number(1e22) == "1e22");
 }
 
-TEST_CASE("a formula as text and its value agree with the same sum written here", "[expression]") {
+TEST_CASE("random formulas have the expected text and value", "[expression]") {
   // Random trees, printed with all their parentheses and reckoned on the way.
   support::Random random(8);
   struct Tree {

@@ -67,7 +67,7 @@ std::vector<double> struck(const std::string& text, std::size_t frames) {
 
 }  // namespace
 
-TEST_CASE("macros have the golden values of appendix A in every printed digit", "[macro]") {
+TEST_CASE("macros match the golden values of appendix A in every digit", "[macro]") {
   constexpr std::size_t at[] = {10, 50, 100, 500, 1000};
   for (const Golden& golden : goldens) {
     const std::vector<double> heard = struck(golden.text, 1000);
@@ -81,7 +81,7 @@ TEST_CASE("macros have the golden values of appendix A in every printed digit", 
   }
 }
 
-TEST_CASE("a macro is the same network as its masses and links written out", "[macro]") {
+TEST_CASE("a macro equals the same network of masses and links", "[macro]") {
   // 5 nodes with two fixed; the place 0.25 is node 1, 0.75 is node 3.
   const std::string written =
       "@a ground 0.1\n@b osc 2. 0. z 0.1 0.1\n@c osc 2. 0. z 0.1 0.1\n@d osc 2. 0. z 0.1 0.1\n"
@@ -195,7 +195,7 @@ TEST_CASE("a place that moves at audio rate follows the published array algorith
   CHECK(forces.relative() < 2e-12);
 }
 
-TEST_CASE("a macro's number of arguments tells its dialect and its air", "[macro]") {
+TEST_CASE("the number of a macro's arguments determines dialect and air damping", "[macro]") {
   struct Form {
     std::string start;
     int least;
@@ -244,12 +244,12 @@ TEST_CASE("a macro's number of arguments tells its dialect and its air", "[macro
   check_error("@s stiffString 2 1 1 1 0 0 0", 1, 16,
               "found '2' where a number of nodes from 3 to 4000000 was expected");
   check_error("@s mesh 3000 3000 1 1 0 0 0", 1, 9,
-              "the macros have more than 4000000 nodes together");
+              "the macros have more than 4000000 nodes in all");
   check_error("@s string 3000000 1 1 0 0 0\n@t string 3000000 1 1 0 0 0", 2, 11,
-              "the macros have more than 4000000 nodes together");
+              "the macros have more than 4000000 nodes in all");
 }
 
-TEST_CASE("a place behind the arguments is taken off before they are counted", "[macro]") {
+TEST_CASE("a place after the arguments does not count as one", "[macro]") {
   const std::string macros =
       two_masses + "@s chain 5 1 1 1 0\n@q mesh 3 4 1 1 1 0\n@p param 0.25\n";
   const auto tapped = [&](const std::string& line) { return network_of(macros + line); };
@@ -281,8 +281,9 @@ TEST_CASE("a place behind the arguments is taken off before they are counted", "
   const std::string one = " is a chain: a place on it needs one coordinate, [@s u], from 0 to 1";
   const std::string two =
       " is a mesh: a place on it needs two coordinates, [@m u v], each from 0 to 1";
-  check_error(macros + "@l spring @a @s 1", 6, 16,
-              "'spring' takes 3 to 4 arguments (@A @B K [Z]), found 2 before the place on a macro");
+  check_error(
+      macros + "@l spring @a @s 1", 6, 16,
+      "'spring' takes 3 to 4 arguments (@A @B K [Z]), found 2 before the place on the macro");
   check_error(macros + "@out1 posOutput @s", 6, 17, "'@s'" + one);
   check_error(macros + "@out1 posOutput [@s]", 6, 17, "'@s'" + one);
   check_error(macros + "@out1 posOutput @q 0.5", 6, 17, "'@q'" + two);
@@ -292,16 +293,16 @@ TEST_CASE("a place behind the arguments is taken off before they are counted", "
   check_error(macros + "@out1 posOutput [@s 0.1 0.2]", 6, 25,
               "found '0' where an operator or the end was expected");
   check_error(macros + "@out1 posOutput [@a 0.5]", 6, 18,
-              "'@a' is one mass, so it has no places on it: write it without '['");
+              "'@a' is a single mass, not a macro: write it without '['");
   check_error(macros + "@out1 posOutput [@ss 0.5]", 6, 18,
               "no macro is called '@ss'; did you mean '@s'?");
   check_error(macros + "@out1 posOutput @a 0.5 2", 6, 24,
               "'posOutput' takes 1 to 2 arguments (@MASS [LEVEL]), found 3");
   check_error(macros + "@out1 posOutput [@s w]", 6, 21,
-              "'w' is no parameter of this model; did you mean 'p'?");
+              "'w' is not a parameter of this model; did you mean 'p'?");
 }
 
-TEST_CASE("a place beyond a macro's end is taken at the end, with a warning", "[macro]") {
+TEST_CASE("a place beyond the end of a macro is clamped, with a warning", "[macro]") {
   const std::string models = "@s chain 5 1 1 0 0 0\n@q mesh 3 3 1 1 0 0 0\n";
   const std::string beyond = "a place on a macro goes from 0 to 1; ";
   check_warning(models + "@out1 posOutput [@s 1.5]", 3, 21, beyond + "'1.5' is taken as 1");
@@ -310,7 +311,7 @@ TEST_CASE("a place beyond a macro's end is taken at the end, with a warning", "[
   messages::check_told(models + "@out1 posOutput [@q 0 1]", {});
 }
 
-TEST_CASE("places, grounds and hands start at rest where they are", "[macro]") {
+TEST_CASE("places, grounds and position inputs start at rest", "[macro]") {
   // Dampers alone: at the first tick nothing has moved, so nothing is felt.
   support::Bare<double> bare(
       make_program(network_of("@in1 posInput 3\n@g ground -2\n@s chain 5 1 0.1 0 [0 0 1.5] 0\n"
@@ -334,7 +335,7 @@ TEST_CASE("places, grounds and hands start at rest where they are", "[macro]") {
   CHECK(initial_velocity(moving, moving.masses[3]) == 0.0);
 }
 
-TEST_CASE("the force at a place is that of the nodes around it, inputs included", "[macro]") {
+TEST_CASE("the force at a place is interpolated, with input forces", "[macro]") {
   // 3 nodes: 0.25 is between the first two. A push there is felt at half of that on each, so half
   // of it is felt where it acts, and a quarter at 0.125, which is nearer to the first: 3/4 and 1/4.
   support::Bare<double> bare(

@@ -53,7 +53,7 @@ void check_error(const Complaint& complaint) {
 
 }  // namespace
 
-TEST_CASE("every keyword takes its numbers of arguments and no other", "[mdl]") {
+TEST_CASE("every keyword accepts only its numbers of arguments", "[mdl]") {
   struct Form {
     std::string start;          // label, keyword and references
     std::string word;           // as the message names it
@@ -119,7 +119,7 @@ TEST_CASE("every keyword takes its numbers of arguments and no other", "[mdl]") 
                "'posOutput' takes 1 to 2 arguments (@MASS [LEVEL]), found 0"});
 }
 
-TEST_CASE("masses, grounds and oscillators are what was written", "[mdl]") {
+TEST_CASE("masses, grounds and oscillators are read correctly", "[mdl]") {
   const Network network = network_of(
       "@p param 0.5\n"
       "@m mass p 1. 2. membrane 0.25 -3\n"
@@ -163,7 +163,7 @@ TEST_CASE("masses, grounds and oscillators are what was written", "[mdl]") {
   CHECK(output_count(network) == 2);
 }
 
-TEST_CASE("links mean what the language says", "[mdl]") {
+TEST_CASE("links are read correctly", "[mdl]") {
   const auto link = [](const std::string& line) { return network_of(two_masses + "@l " + line); };
   Network n = link("spring @b @a 2");
   CHECK(n.links[0].law == Law::spring);
@@ -245,13 +245,13 @@ TEST_CASE("lines may come in any order and layout", "[mdl]") {
   check_error({"\n\n\t@m\tmass\t0\t0\t0", 3, 10, "a mass must be above 0, found '0'"});
 }
 
-TEST_CASE("every error tells its line, its column and what was expected", "[mdl]") {
+TEST_CASE("every error has a line, a column and the expected text", "[mdl]") {
   const std::string p = "@m_K param 1\n";
   const std::vector<Complaint> complaints = {
       {"", 1, 1, "the model is empty: expected elements such as '@m mass 1. 0. 0.'"},
       {"# only a comment\n", 1, 1,
        "the model is empty: expected elements such as '@m mass 1. 0. 0.'"},
-      {"@p param 1\n", 1, 1, "the model has no masses: nothing can sound"},
+      {"@p param 1\n", 1, 1, "the model has no masses, so it makes no sound"},
       {"  @", 1, 3, "expected a label right after '@'"},
       {"@m", 1, 3, "the line ends where a keyword was expected, such as 'mass' or 'springDamper'"},
       {"@m mas 1. 0. 0.", 1, 4, "unknown keyword 'mas'; did you mean 'mass'?"},
@@ -261,31 +261,33 @@ TEST_CASE("every error tells its line, its column and what was expected", "[mdl]
       {"@m mass 0. 0. 0.", 1, 9, "a mass must be above 0, found '0.'"},
       {"@m mass -1 0. 0.", 1, 9, "a mass must be above 0, found '-1'"},
       {"@m mass 1. zero 0.", 1, 12,
-       "found 'zero' where a number was expected (a starting state is no parameter)"},
+       "found 'zero' where a number was expected (a state at the start cannot be a parameter)"},
       {"@m mass 1. 0. 1..2", 1, 15, "found '1..2' where a number was expected"},
-      {"@m mass 1. [1 2] 0", 1, 12, "a place is one number or three, [x y z]; found 2"},
+      {"@m mass 1. [1 2] 0", 1, 12, "a position is one number or three, [x y z]; found 2"},
       {"@m mass 1. [1 2 x] 0", 1, 17, "found 'x' where a number was expected"},
       {"@k audioParam @out2", 1, 15,
        "'audioParam' needs the label '@inN' with N from 1 to 64, found '@out2'"},
       {"~begin", 1, 1, "expected '~begin NAME' or '~end NAME'"},
       {"~end x", 1, 6, "no block 'x' is open here"},
       {"@m mass 1. nan 0.", 1, 12,
-       "found 'nan' where a number was expected (a starting state is no parameter)"},
+       "found 'nan' where a number was expected (a state at the start cannot be a parameter)"},
       {"@m mass 1. 0. -inf", 1, 15, "found '-inf' where a number was expected"},
       {"@m mass 1. 0. 1e999", 1, 15, "found '1e999' where a number was expected"},
-      {"@m mass inf 0. 0.", 1, 9, "'inf' is no parameter of this model"},
+      {"@m mass inf 0. 0.", 1, 9, "'inf' is not a parameter of this model"},
       {"@m mass 1x 0. 0.", 1, 10, "found 'x' where an operator or the end was expected"},
       {"@m mass 2*(1 0. 0.", 1, 13, "expected ')'"},
       {"@m mass [2*(1 ] 0. 0.", 1, 15, "expected ')'"},
-      {p + "@m mass m_k 0. 0.", 2, 9, "'m_k' is no parameter of this model; did you mean 'm_K'?"},
-      {p + "@m mass 2*m_k 0. 0.", 2, 11, "'m_k' is no parameter of this model"},
+      {p + "@m mass m_k 0. 0.", 2, 9,
+       "'m_k' is not a parameter of this model; did you mean 'm_K'?"},
+      {p + "@m mass 2*m_k 0. 0.", 2, 11, "'m_k' is not a parameter of this model"},
       {p + "@m mass sqr(m_K) 0. 0.", 2, 9,
-       "unknown function 'sqr'; there are sqrt abs sin cos exp pow min max clamp"},
+       "unknown function 'sqr'; known functions: sqrt abs sin cos exp pow min max clamp"},
       {"@p param x\n@m mass p 0 0", 1, 10,
        "found 'x' where the parameter's value, a number, was expected"},
       {"@p param nan\n@m mass p 0 0", 1, 10,
        "found 'nan' where the parameter's value, a number, was expected"},
-      {"@a-b param 1\n@m mass 1 0 0", 1, 1, "a parameter's name has letters, digits and '_' only"},
+      {"@a-b param 1\n@m mass 1 0 0", 1, 1,
+       "a parameter's name may have only letters, digits and '_'"},
       {"@m mass 1 0 0\n\n@m mass 1 0 0", 3, 1, "'@m' is already declared in line 1"},
       {"@m mass 1 0 0\n@m param 1", 2, 1, "'@m' is already declared in line 1"},
       {two_masses + "@in1 frcInput @a\n@in1 frcInput @b", 4, 1,
@@ -296,9 +298,10 @@ TEST_CASE("every error tells its line, its column and what was expected", "[mdl]
       {"@first mass 1 0 0\n@in1 frcInput first", 2, 15,
        "found 'first' where '@' and the label of a mass were expected"},
       {p + "@m mass m_K 0 0\n@out1 posOutput @m_K", 3, 17,
-       "'@m_K' is no mass, so nothing can be attached to it"},
+       "'@m_K' is not a mass, so nothing can be attached to it"},
       {"@m mass 1e999 0. 0.", 1, 9, "the number is too large or too small"},
-      {two_masses + "@l nlBow @a @b 1 1 smooth", 3, 20, "'smooth' is no parameter of this model"},
+      {two_masses + "@l nlBow @a @b 1 1 smooth", 3, 20,
+       "'smooth' is not a parameter of this model"},
       {two_masses + "@K param 1\n@l spring @a @b K * 2", 4, 21,
        "'spring' takes 3 to 4 arguments (@A @B K [Z]), found 5; an expression with blanks needs "
        "brackets, [K * 2]"},
@@ -320,8 +323,8 @@ TEST_CASE("every error tells its line, its column and what was expected", "[mdl]
       {two_masses + "@in99999999999 frcInput @a", 3, 1,
        "'frcInput' needs the label '@inN' with N from 1 to 64, found '@in99999999999'"},
       {std::string("@m mass 1 0 0\n@n m\0ss", 20), 2, 5,
-       "found a zero byte: this is no text, so it is no model"},
-      {std::string(1, '\0'), 1, 1, "found a zero byte: this is no text, so it is no model"},
+       "found a zero byte: this is a binary file, not a model"},
+      {std::string(1, '\0'), 1, 1, "found a zero byte: this is a binary file, not a model"},
       {std::string(max_model_bytes + 1, '\n'), 1, 1,
        "the model is longer than the 32 MiB that are read"},
   };
@@ -330,7 +333,7 @@ TEST_CASE("every error tells its line, its column and what was expected", "[mdl]
   }
 }
 
-TEST_CASE("a file of nothing but errors is given up after a hundred", "[mdl]") {
+TEST_CASE("reading stops after a hundred errors", "[mdl]") {
   // Each kind costs the reader most in another way; the test's time limit is what they break.
   std::string unknown_words;
   std::string unknown_masses;
@@ -349,10 +352,10 @@ TEST_CASE("a file of nothing but errors is given up after a hundred", "[mdl]") {
     CHECK(parsed.diagnostics.size() <= 101);
   }
   const ParsedNetwork parsed = parse_network(unknown_masses);
-  CHECK(parsed.diagnostics.back().message == "too many problems; those after this are not told");
+  CHECK(parsed.diagnostics.back().message == "too many errors; stopping here");
 }
 
-TEST_CASE("text that no person wrote does no harm", "[mdl]") {
+TEST_CASE("random text does not crash the reader", "[mdl]") {
   support::Random random(3);
   const std::string letters = "@@@@  \t\n\n\r#[]'+-*/().,0129eabmassosc_\x80\xff~";
   for (int i = 0; i < 3000; ++i) {
@@ -387,7 +390,7 @@ TEST_CASE("text that no person wrote does no harm", "[mdl]") {
   }
 }
 
-TEST_CASE("texts that are monstrous are refused in a sentence with a place", "[mdl]") {
+TEST_CASE("huge texts are rejected with an error", "[mdl]") {
   const std::string big(1'000'000, '(');
   const std::string rest = " 0. 0.";
   check_error({"@a mass " + big + "1" + rest, 1, 42, "the parentheses are nested too deeply"});
@@ -397,20 +400,21 @@ TEST_CASE("texts that are monstrous are refused in a sentence with a place", "[m
   check_error({"@K param 1e999999\n@a mass 1" + rest, 1, 10,
                "found '1e999999' where the parameter's value, a number, was expected"});
   check_error({"@a mass 1 1e999999 0.", 1, 11, "found '1e999999' where a number was expected"});
-  check_error(
-      {"@" + std::string(1'000'000, 'm') + " mass 1" + rest, 1, 1,
-       "'" + std::string(40, 'm') +
-           "...' is no label: it is longer than 1000 bytes, or has what cannot be printed"});
+  check_error({"@" + std::string(1'000'000, 'm') + " mass 1" + rest, 1, 1,
+               "'" + std::string(40, 'm') +
+                   "...' is not a label: it is longer than 1000 bytes or has characters that "
+                   "cannot be printed"});
   check_error({"@a\x1b[2J mass 1" + rest, 1, 1,
-               "'a?' is no label: it is longer than 1000 bytes, or has what cannot be printed"});
+               "'a?' is not a label: it is longer than 1000 bytes or has characters that cannot be "
+               "printed"});
   check_error({"@a mass " + std::string(1'000'000, 'x') + rest, 1, 9,
-               "'" + std::string(40, 'x') + "...' is no parameter of this model"});
+               "'" + std::string(40, 'x') + "...' is not a parameter of this model"});
   // A lone CR ends a line, also where the text ends in what is none.
   check_error({std::string("@a mass 1 0 0\r@b mass 1 0 0\r\n@c\0", 32), 3, 3,
-               "found a zero byte: this is no text, so it is no model"});
+               "found a zero byte: this is a binary file, not a model"});
 }
 
-TEST_CASE("letters of several bytes are shown as they are, all else as '?'", "[mdl]") {
+TEST_CASE("messages show valid UTF-8 unchanged, and '?' otherwise", "[mdl]") {
   CHECK(ressort::quoted("caf\u00e9 \u266a") == "'caf\u00e9 \u266a'");
   CHECK(ressort::quoted("\xe9\x1b\x80\xc2\x85\xe2\x82") == "'" + std::string(7, '?') + "'");
   CHECK(ressort::quoted(std::string(50, 'a')) == "'" + std::string(40, 'a') + "...'");
@@ -419,14 +423,14 @@ TEST_CASE("letters of several bytes are shown as they are, all else as '?'", "[m
     accents += "\u00e9";
   }
   CHECK(ressort::quoted(accents) == "'" + accents.substr(0, 80) + "...'");
-  check_error({"@a mass K\u00e9 0. 0.", 1, 9, "'K' is no parameter of this model"});
+  check_error({"@a mass K\u00e9 0. 0.", 1, 9, "'K' is not a parameter of this model"});
   check_error(
       {"@a mass 1\u00e9 0. 0.", 1, 10, "found '\u00e9' where an operator or the end was expected"});
   check_error({"@mmm\u00e9 mass 1 0 0\n@l spring @mmm @mmm\u00e9 1\n", 2, 11,
                "no mass is called '@mmm'; did you mean '@mmm\u00e9'?"});
 }
 
-TEST_CASE("labels of any length are kept, and copied with their network", "[mdl]") {
+TEST_CASE("labels of any length survive copying the network", "[mdl]") {
   for (const std::size_t length : {1, 14, 15, 16, 17, 127, 300}) {
     const std::string label(length, 'm');
     const std::string text = "@" + label + " mass 1. 0. 0.\n@g ground 0.\n@" + label +

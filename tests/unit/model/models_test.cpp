@@ -67,8 +67,9 @@ TEST_CASE("the models are the published networks", "[models]") {
 
 // One loudness for all puts what sounds on and pure at the lower end, a click that echoes at the
 // upper: presets/README.md has the table.
-TEST_CASE("every preset has two ears, a forte between -22 and -1 dBFS, and 14 to 34 dB of velocity",
-          "[models]") {
+TEST_CASE(
+    "every preset has two outputs, a forte between -22 and -1 dBFS, and 14 to 34 dB of velocity",
+    "[models]") {
   const std::vector<std::string> names = known_presets();
   CHECK(names.size() >= 24);
   for (const std::string& name : names) {

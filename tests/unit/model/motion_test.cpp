@@ -23,7 +23,7 @@ std::string doubt(const ParsedNetwork& parsed) {
 
 }  // namespace
 
-TEST_CASE("the reader says which meaning a motion has, and why", "[motion]") {
+TEST_CASE("the reader reports the meaning of a motion and the reason", "[motion]") {
   struct Case {
     std::string text;
     ThirdArgument third;
@@ -37,12 +37,14 @@ TEST_CASE("the reader says which meaning a motion has, and why", "[motion]") {
                 "both meanings agree: every mass starts at 0, at rest"},
            Case{"~motion velocity\n@a mass 1 1 1", velocity, per_second + "line 1 says"},
            Case{"@a mass 1 1 0\n~motion delayed", delayed, before + "line 2 says"},
-           Case{"@a mass 1 1 1", delayed, before + "line 1 has a rest with the position itself"},
+           Case{"@a mass 1 1 1", delayed,
+                before + "line 1 rests with a motion equal to its position"},
            Case{"@a mass 1 0 1", delayed, before + "line 1 starts from 0"},
-           Case{"@a mass 1 1 0", velocity, per_second + "line 1 has a rest away from 0 with 0"},
-           Case{"@a mass 1 1 2", delayed, before + "nothing shows another meaning"},
+           Case{"@a mass 1 1 0", velocity,
+                per_second + "line 1 rests away from 0 with a motion of 0"},
+           Case{"@a mass 1 1 2", delayed, before + "nothing indicates the other meaning"},
            Case{"@a mass 1 1 2\n@b osc 1 1 1 1 0", velocity,
-                per_second + "line 2 has a rest away from 0 with 0"},
+                per_second + "line 2 rests away from 0 with a motion of 0"},
            Case{"@a mass 1 [0 0 1] 2", velocity,
                 per_second + "line 1 writes a place as [x y z], which is MIMS4Max"},
            Case{"@a mass [2*3] 1 2", velocity,
@@ -67,7 +69,7 @@ TEST_CASE("the reader says which meaning a motion has, and why", "[motion]") {
                 per_second + "line 4 chooses a bow's profile, which is MIMS4Max"},
            Case{"@a massG 1 1 1 0", delayed, before + "line 1 has 'massG', which is MIMS"},
            Case{"@a mass 1 1 0 x 1 1", delayed,
-                before + "line 1 names a drawing behind its arguments, which is MIMS"},
+                before + "line 1 names a drawing after its arguments, which is MIMS"},
            Case{"@s string 5 1 1 0 1", delayed,
                 before + "line 1 gives a macro no motion, which is MIMS"},
            Case{"@a mass 1 1 0\n@out1 posOutput @s 1\n@s string 5 1 1 0 0 ", delayed,
@@ -83,7 +85,7 @@ TEST_CASE("the reader says which meaning a motion has, and why", "[motion]") {
   }
 }
 
-TEST_CASE("who asks for a meaning gets it, whatever the text says", "[motion]") {
+TEST_CASE("the option for the meaning overrides the text", "[motion]") {
   for (const std::string text :
        {"@a mass 1 1 2", "@a mass 1 1 0", "~motion velocity\n@a mass 1 1 2",
         "~motion delayed\n@a mass 1 [0 0 1] 2"}) {
@@ -100,7 +102,7 @@ TEST_CASE("who asks for a meaning gets it, whatever the text says", "[motion]") 
   }
 }
 
-TEST_CASE("the same state starts as fast as its meaning says", "[motion]") {
+TEST_CASE("the meaning determines the initial velocity", "[motion]") {
   const auto speed = [](const std::string& text) {
     const Network network = support::network_of(text);
     return initial_velocity(network, network.masses[0]);
@@ -116,7 +118,7 @@ TEST_CASE("the same state starts as fast as its meaning says", "[motion]") {
   }
 }
 
-TEST_CASE("states that speak for both meanings all rest, and that is told", "[motion]") {
+TEST_CASE("states that fit both meanings are read as rest, with a warning", "[motion]") {
   const ParsedNetwork parsed =
       parse_network("@a mass 1 2 2\n@b mass 1 3 0\n@c osc 1 1 1 -1 0\n@d mass 1 0 0");
   REQUIRE(parsed.ok());
@@ -126,11 +128,12 @@ TEST_CASE("states that speak for both meanings all rest, and that is told", "[mo
   }
   CHECK(doubt(parsed) ==
         "2: a motion of 0 is read as rest, although the motion is the position one sample before, "
-        "as line 1 has a rest with the position itself; '~motion velocity' or '~motion delayed' "
+        "as line 1 rests with a motion equal to its position; '~motion velocity' or '~motion "
+        "delayed' "
         "ends this doubt");
 }
 
-TEST_CASE("a text of both dialects is a doubt only where something moves", "[motion]") {
+TEST_CASE("a mix of dialects causes a warning only if something moves", "[motion]") {
   const std::string both = ends + "@g massG 1 0.1 0 0\n@l nlContact @a @b 1 1 1 1\n";
   const ParsedNetwork moving = parse_network(both + "@c mass 1 2 1");
   REQUIRE(moving.ok());
@@ -146,7 +149,7 @@ TEST_CASE("a text of both dialects is a doubt only where something moves", "[mot
   CHECK(doubt(parse_network(both + "@s string 5 1 1 0 0 1")).starts_with("5: its motion is read"));
 }
 
-TEST_CASE("a meaning that is none, and two that differ, are errors", "[motion]") {
+TEST_CASE("unknown and contradictory meanings are errors", "[motion]") {
   struct Wrong {
     const char* text;
     int line;

@@ -43,11 +43,11 @@ std::string replaced(std::string all, const std::string& what, const std::string
 
 }  // namespace
 
-TEST_CASE("what did not change stays to the byte", "[preset_edit]") {
+TEST_CASE("unchanged text is preserved byte for byte", "[preset_edit]") {
   CHECK(edited({.model = "a.mdl", .gain = 2.0}) == text);
 }
 
-TEST_CASE("values take the place of values, comments stay", "[preset_edit]") {
+TEST_CASE("edits replace values and keep comments", "[preset_edit]") {
   const std::string all =
       edited({.model = "/tmp/\"b\".mdl",
               .gain = 3.5,
@@ -58,14 +58,14 @@ TEST_CASE("values take the place of values, comments stay", "[preset_edit]") {
   CHECK(all == replaced(wanted, "value = 0 }", "value = 0.5 }"));
 }
 
-TEST_CASE("a parameter that was not there comes under the others", "[preset_edit]") {
+TEST_CASE("a new parameter is added after the others", "[preset_edit]") {
   const std::string all =
       edited({.model = "a.mdl", .gain = 2.0, .parameters = {{"M", 1.0, 0.5, 2.0}}});
   CHECK(all == replaced(text, "[parameters]\n",
                         "[parameters]\nM = { value = 1.0, range = [0.5, 2.0] }\n"));
 }
 
-TEST_CASE("what a controller has learnt takes the place of what it did", "[preset_edit]") {
+TEST_CASE("a learned control replaces the controls of its controller", "[preset_edit]") {
   const ControlSetting learned{.source = ControlSource::controller,
                                .number = 1,
                                .target = "Z\u00fc",
@@ -82,7 +82,7 @@ TEST_CASE("what a controller has learnt takes the place of what it did", "[prese
   CHECK(read == learned);
 }
 
-TEST_CASE("a preset without a gain gets one, and what is no preset is refused", "[preset_edit]") {
+TEST_CASE("a missing gain is added, and a text that is not a preset is rejected", "[preset_edit]") {
   const auto short_one = edit_preset("model = \"a.mdl\"", {.model = "a.mdl", .gain = 0.5});
   REQUIRE(short_one);
   CHECK(*short_one == "model = \"a.mdl\"\ngain = 0.5\n");
@@ -90,7 +90,7 @@ TEST_CASE("a preset without a gain gets one, and what is no preset is refused", 
   CHECK_FALSE(edit_preset("[[", {.model = "a.mdl"}));
 }
 
-TEST_CASE("a printed preset reads as what it is", "[preset_edit]") {
+TEST_CASE("a printed preset reads back unchanged", "[preset_edit]") {
   Preset preset{
       .model = "b.mdl", .description = "a \"b\" \\", .voices = 4, .gain = 12.0, .damper_s = 0.3};
   preset.transpose = -12;

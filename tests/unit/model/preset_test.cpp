@@ -43,7 +43,7 @@ ControlSetting control_of(const std::string& keys) {
 
 }  // namespace
 
-TEST_CASE("a preset is what was written, and the rest its defaults", "[preset]") {
+TEST_CASE("a preset has the values of its text, and defaults", "[preset]") {
   const auto parsed = parse_preset(
       "model = \"PolyTriangle.mdl\"\n"
       "description = \"three masses\"\n"
@@ -99,7 +99,7 @@ TEST_CASE("a preset is what was written, and the rest its defaults", "[preset]")
   CHECK(least.preset == Preset{.model = "x.mdl"});
 }
 
-TEST_CASE("a preset says how its keys are tuned and played", "[preset]") {
+TEST_CASE("the keys for tuning and playing are read", "[preset]") {
   const auto parsed = parse_preset(
       "model = \"x.mdl\"\na4_hz = 442.5\nscale = \"a.scl\"\nkeyboard_map = \"a.kbm\"\n"
       "channels = [1, 3, 16]\nvelocity = -0.5\nplay = \"legato\"\nglide_s = 0.25\n");
@@ -163,7 +163,7 @@ TEST_CASE("a preset says how its keys are tuned and played", "[preset]") {
   }
 }
 
-TEST_CASE("every source and every gesture has its word", "[preset]") {
+TEST_CASE("all sources and gestures are read", "[preset]") {
   const auto from = [](const std::string& word) {
     return control_of("from = \"" + word + "\"\nto = \"in1\"");
   };
@@ -191,7 +191,7 @@ TEST_CASE("every source and every gesture has its word", "[preset]") {
   CHECK(control_of("from = \"cc1\"\nto = \"inner\"").gesture == Gesture::parameter);
 }
 
-TEST_CASE("no control has an address that the program takes for itself", "[preset]") {
+TEST_CASE("reserved OSC addresses are rejected", "[preset]") {
   for (const Row* const row : addresses()) {
     std::string address = row->address;
     if (const std::size_t at = address.find("NAME"); at != std::string::npos) {
@@ -210,7 +210,7 @@ TEST_CASE("no control has an address that the program takes for itself", "[prese
   CHECK(control_of("to = \"in1\"\nfrom = \"" + longest + "\"").address == longest);
 }
 
-TEST_CASE("every fault of a preset is told with its line and column", "[preset]") {
+TEST_CASE("errors in presets have a line and a column", "[preset]") {
   const std::string m = "model = \"x.mdl\"\n";
   const std::string to = "to = \"in1\"\n";
   const std::vector<Complaint> complaints = {
@@ -239,7 +239,7 @@ TEST_CASE("every fault of a preset is told with its line and column", "[preset]"
       {m + "[[control]]\nfrom = \"note\"\n" + to + "round_robin = [0, 2]", 5, 16,
        "'round_robin' must lie between 1 and 16"},
       {m + "[[control]]\nfrom = \"cc1\"\n" + to + "round_robin = [1, 2]", 5, 15,
-       "'round_robin' is for notes"},
+       "'round_robin' is for notes only"},
       {m + "noise = 1", 2, 9, "'noise' must be true or false"},
       {m + "tuning = \"odd\"", 2, 10, "'tuning' must be keyboard or fixed"},
       {m + "transpose = 97", 2, 13, "'transpose' must lie between -96 and 96"},
@@ -260,7 +260,7 @@ TEST_CASE("every fault of a preset is told with its line and column", "[preset]"
        "'range' must be two numbers: [low, high]"},
       {m + "[parameters]\nK = { value = 1, range = [0, \"x\"] }", 3, 30,
        "'range' must be a number"},
-      {m + "control = 1", 2, 11, "controls are written one by one: [[control]]"},
+      {m + "control = 1", 2, 11, "write each control as a table of its own: [[control]]"},
       {with_control(to + "from = \"note\"\nform = 1"), 5, 8,
        "unknown key 'form' in a control; there are from, to"},
       {with_control(to), 2, 1, "'from' must be \"note\""},
@@ -301,7 +301,7 @@ TEST_CASE("every fault of a preset is told with its line and column", "[preset]"
   }
 }
 
-TEST_CASE("every fault of a preset is told at once, line by line", "[preset]") {
+TEST_CASE("all errors of a preset are reported in order", "[preset]") {
   const auto read = parse_preset(
       "voices = 0\n"
       "gian = 2\n"
@@ -335,10 +335,10 @@ TEST_CASE("every fault of a preset is told at once, line by line", "[preset]") {
   }
   const auto all = parse_preset(many);
   REQUIRE(all.errors.size() == most_preset_errors + 1);
-  CHECK(all.errors.back().message == "too many problems; those after this are not told");
+  CHECK(all.errors.back().message == "too many errors; stopping here");
 }
 
-TEST_CASE("what nests deeper than a preset can is refused before it is parsed", "[preset]") {
+TEST_CASE("deeply nested TOML is rejected before parsing", "[preset]") {
   const auto repeated = [](std::size_t times, const std::string& text) {
     std::string all;
     for (std::size_t i = 0; i < times; ++i) {
@@ -376,7 +376,7 @@ TEST_CASE("what nests deeper than a preset can is refused before it is parsed", 
   check_error({"model = \"x.mdl\"\n" + repeated(8, "a.") + "a = 1", 2, 1, "unknown key 'a'"});
 }
 
-TEST_CASE("what is no TOML is told with its place, and nothing throws", "[preset]") {
+TEST_CASE("invalid TOML is reported with its position", "[preset]") {
   for (const std::string text : {"model = ", "model = \"x", "[parameters",
                                  "model = \"x\"\nmodel = \"y\"", "= 3", "\xff\xfe", "a = [1, 2"}) {
     const auto preset = parse_preset(text);
@@ -405,7 +405,7 @@ TEST_CASE("what is no TOML is told with its place, and nothing throws", "[preset
   }
 }
 
-TEST_CASE("a model whose inputs no key can play says so, and which line is missing", "[preset]") {
+TEST_CASE("a model that no key can play suggests a line to add", "[preset]") {
   const std::string triangle = "@g ground 0.\n@m0 mass 1. 0. 0.\n@l spring @g @m0 0.1\n";
   const auto told = [&](const std::string& text) -> std::string {
     const Network network = network_of(text);
@@ -435,7 +435,7 @@ TEST_CASE("a model whose inputs no key can play says so, and which line is missi
   CHECK(second.controls[1].target == "in2");
 }
 
-TEST_CASE("all that does not fit the model is told at once", "[preset]") {
+TEST_CASE("all mismatches between preset and model are reported", "[preset]") {
   const auto preset = parse_preset(
       "model = \"x.mdl\"\n[[control]]\nfrom = \"cc1\"\nto = \"Q\"\n[[control]]\n"
       "from = \"note\"\nto = \"in2\"\n[parameters]\nP = { value = 1, range = [0, 1] }\n");
@@ -450,7 +450,7 @@ TEST_CASE("all that does not fit the model is told at once", "[preset]") {
   CHECK(found[2].message == "the model has no parameter 'P'; it has m_K, m_Z");
 }
 
-TEST_CASE("without a preset a model is played by what its links ask for", "[preset]") {
+TEST_CASE("the default preset chooses gestures by the laws of the links", "[preset]") {
   const Preset struck = default_preset(network_of(scenes::poly_triangle()), false);
   CHECK(struck.keyboard);
   CHECK(struck.gain == 1.0);

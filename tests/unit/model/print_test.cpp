@@ -35,7 +35,7 @@ bool has_line(const std::string& text, const std::string& line) {
 
 }  // namespace
 
-TEST_CASE("a network is printed in sections, one element a line", "[print]") {
+TEST_CASE("a network is printed in sections, with one element per line", "[print]") {
   const std::string printed =
       "# Parameters\n"
       "@k param 0.1\n"
@@ -83,7 +83,7 @@ TEST_CASE("a network is printed in sections, one element a line", "[print]") {
   CHECK(print_network(network_of(written)) == printed);
 }
 
-TEST_CASE("every form of every keyword is printed in one", "[print]") {
+TEST_CASE("all variants of a keyword are printed in one form", "[print]") {
   struct Form {
     std::string written;
     std::string printed;
@@ -148,7 +148,7 @@ TEST_CASE("every form of every keyword is printed in one", "[print]") {
   }
 }
 
-TEST_CASE("links of one label keep what they are", "[print]") {
+TEST_CASE("links with the same label are preserved", "[print]") {
   const Network network = network_of(
       "@in01 mass 1 0 0\n@in1 posInput 0\n@a spring @in01 @in1 1\n"
       "@a spring @in01 @in1 2\n@out3 posOutput @in1\n");
@@ -205,7 +205,7 @@ TEST_CASE("expressions are printed with the fewest parentheses", "[print]") {
   }
 }
 
-TEST_CASE("the motion is said only where a reader would guess it wrongly", "[print]") {
+TEST_CASE("'~motion' is printed only if it is needed", "[print]") {
   const auto starts = [](const std::string& text) {
     const Network network = network_of(text);
     check_round_trip(network);
@@ -226,7 +226,7 @@ TEST_CASE("the motion is said only where a reader would guess it wrongly", "[pri
   CHECK(starts("~motion delayed\n@m mass 1 1 0\n@n mass 1 0 1") == "~motion delayed");
 }
 
-TEST_CASE("equal networks are equal however their texts number their arguments", "[print]") {
+TEST_CASE("equal networks compare equal in any order of arguments", "[print]") {
   const Network plain = network_of(
       "@p param 2\n@m mass 1 0 0\n@o osc 1 0.5 p*2 0 0\n@l springDamper @m @o 1 0.5\n"
       "@s string 5 1 p 0.5 0 0\n@in1 posInput 0\n@in2 frcInput [@s 0.5]\n@out1 posOutput [@s 1]");
@@ -245,7 +245,7 @@ TEST_CASE("equal networks are equal however their texts number their arguments",
   CHECK(parted.taps[1] == parted.taps[0]);
 }
 
-TEST_CASE("what has no names is printed with some that are free", "[print]") {
+TEST_CASE("unnamed elements are printed with unused names", "[print]") {
   const Network network = network_of(
       "@m0 param 0.5\n@r0 ground 0\n@s string 5 1 1 m0 0 0\n@x chain 3 1 1 0 0.001 0 0\n"
       "@l spring @r0 [@s 0.25] 1\n@k spring @r0 [@s 0.3] 1\n@out1 posOutput [@s m0]\n");
@@ -263,7 +263,7 @@ TEST_CASE("what has no names is printed with some that are free", "[print]") {
   check_round_trip(read);
 }
 
-TEST_CASE("every model that comes with the program is printed and read back", "[print]") {
+TEST_CASE("every shipped model reads back unchanged after printing", "[print]") {
   const auto names = known_models();
   CHECK(names.size() >= 9);
   for (const std::string& name : names) {
@@ -495,7 +495,7 @@ Network disordered(Network network) {
 
 }  // namespace
 
-TEST_CASE("two thousand networks come back from their texts as they were", "[print]") {
+TEST_CASE("two thousand random networks read back unchanged after printing", "[print]") {
   constexpr std::uint64_t seed = 20260;
   Maker maker(seed);
   for (int i = 0; i < 2000; ++i) {

@@ -28,7 +28,7 @@ const std::string heard = "@out1 posOutput @a\n";
 
 // --- R14 ---------------------------------------------------------------------------------------
 
-TEST_CASE("what is no element, comment or block is passed over with a warning", "[problems]") {
+TEST_CASE("unknown lines are skipped with a warning", "[problems]") {
   const std::string sounding = two_masses + "@l spring @a @b 1\n" + heard;
   const auto ignored = [](const std::string& word) {
     return "ignored: an element starts with '@', a comment with '#', found " + word;
@@ -78,7 +78,7 @@ TEST_CASE("the laws are the current ones", "[problems]") {
 
 // --- all of them -------------------------------------------------------------------------------
 
-TEST_CASE("every problem of a file is told in one pass", "[problems]") {
+TEST_CASE("all errors of a file are reported in one pass", "[problems]") {
   check_told(
       "@p param one\n@a mass 1. 0. 0.\n@b mas 1. 0. 0.\nprose\n@r spring @a @c p\n"
       "@q spring @a @a\n@s string 1 1 1 0 0 0\n@in0 frcInput @a\n@out1 posOutput [@t 0.5]\n"
@@ -99,7 +99,7 @@ TEST_CASE("every problem of a file is told in one pass", "[problems]") {
        {Severity::error, 11, 9, 1, "this [ is never closed"}});
 }
 
-TEST_CASE("a hundred warnings are enough, and no error", "[problems]") {
+TEST_CASE("warnings stop after a hundred, and are not errors", "[problems]") {
   std::string text = two_masses + "@l spring @a @b 1\n" + heard;
   for (int i = 0; i < 300; ++i) {
     text += "prose\n";
@@ -107,14 +107,14 @@ TEST_CASE("a hundred warnings are enough, and no error", "[problems]") {
   const ParsedNetwork parsed = parse_network(text);
   CHECK(parsed.ok());
   REQUIRE(parsed.diagnostics.size() == 101);
-  CHECK(parsed.diagnostics.back().message == "too many problems; those after this are not told");
+  CHECK(parsed.diagnostics.back().message == "too many warnings; the rest are not shown");
   // Behind them an error is still told.
   const ParsedNetwork wrong = parse_network(text + "@c mas 1 0 0");
   CHECK_FALSE(wrong.ok());
   CHECK(wrong.diagnostics.back().line == 305);
 }
 
-TEST_CASE("what is looked for in every line has a bound", "[problems]") {
+TEST_CASE("searches for similar names are bounded", "[problems]") {
   std::string text = two_masses;
   std::string blocks = two_masses;
   for (int i = 0; i < 1025; ++i) {
@@ -125,7 +125,7 @@ TEST_CASE("what is looked for in every line has a bound", "[problems]") {
   check_error(blocks, 1027, 1, "more than 1024 blocks are open here");
 }
 
-TEST_CASE("a problem is shown as compilers show theirs", "[problems]") {
+TEST_CASE("errors have the format of compilers", "[problems]") {
   const ParsedNetwork parsed = parse_network(two_masses + "@l sprng @a @b 1\nx\n");
   REQUIRE(parsed.diagnostics.size() == 2);
   CHECK(to_string(parsed.diagnostics[0], "dir/x.mdl") ==
@@ -134,12 +134,12 @@ TEST_CASE("a problem is shown as compilers show theirs", "[problems]") {
         "x.mdl:4:1: warning: ignored: an element starts with '@', a comment with '#', found 'x'");
 }
 
-TEST_CASE("arithmetic that goes wrong is told where it does", "[problems]") {
+TEST_CASE("arithmetic errors have a position", "[problems]") {
   const auto told = [](const std::string& argument, int column, const std::string& message) {
     check_error("@m mass " + argument + " 0 0", 1, column, message);
   };
-  told("1/0", 9, "'1/0' is no finite number");
-  told("sqrt(0-1)", 9, "'sqrt(0-1)' is no finite number");
+  told("1/0", 9, "'1/0' is not a finite number");
+  told("sqrt(0-1)", 9, "'sqrt(0-1)' is not a finite number");
   told("pow(10)", 15, "expected ',': pow takes 2 arguments");
   told("max(1,2,3)", 16, "expected ')' after the arguments of max");
   told("2**3", 11, "found '*' where a number, a name or '(' was expected");

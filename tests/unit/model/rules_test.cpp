@@ -45,7 +45,7 @@ Network linked(const std::string& line) {
 
 // --- R1 ----------------------------------------------------------------------------------------
 
-TEST_CASE("an unknown keyword is an error that names the nearest one", "[rules]") {
+TEST_CASE("an unknown keyword is an error with a suggestion", "[rules]") {
   // Of every keyword: a letter lost, a letter doubled, two exchanged. What is told is no further
   // away than the word that was meant.
   for (const Keyword& keyword : keywords()) {
@@ -79,7 +79,7 @@ TEST_CASE("an unknown keyword is an error that names the nearest one", "[rules]"
 
 // --- R2 ----------------------------------------------------------------------------------------
 
-TEST_CASE("the older words are the newer ones", "[rules]") {
+TEST_CASE("older keywords are synonyms of newer ones", "[rules]") {
   CHECK(linked("springDamperDamper @a @b 1 2") == linked("springDamper @a @b 1 2"));
   CHECK(linked("detent @a @b 1 2 3") == linked("contact @a @b 1 2 3"));
   CHECK(linked("detent @a @b 1 2") == linked("contact @a @b 1 2"));
@@ -97,7 +97,7 @@ TEST_CASE("the older words are the newer ones", "[rules]") {
 
 // --- R3, R4 ------------------------------------------------------------------------------------
 
-TEST_CASE("what may be left out is 0", "[rules]") {
+TEST_CASE("omitted arguments are 0", "[rules]") {
   CHECK(linked("spring @a @b 2 3") == linked("springDamper @a @b 2 3"));
   CHECK(linked("spring @a @b 2") == linked("springDamper @a @b 2"));
   struct Form {
@@ -151,7 +151,7 @@ TEST_CASE("what may be left out is 0", "[rules]") {
 
 // --- R5 ----------------------------------------------------------------------------------------
 
-TEST_CASE("a form that one dialect alone has says what a third argument means", "[rules]") {
+TEST_CASE("a form of one dialect determines the meaning of the third argument", "[rules]") {
   // Behind a mass that would be read otherwise without it.
   const std::string as_delayed = two_masses + "@c mass 1 0 1\n@k param 1\n";
   const std::string as_velocity = two_masses + "@c mass 1 1 0\n@k param 1\n";
@@ -218,7 +218,7 @@ TEST_CASE("a form that one dialect alone has says what a third argument means", 
   CHECK(network_of(two_masses + "@c massG 1 1 2 0\n@x contact @a @b 1 1").third == velocity);
 }
 
-TEST_CASE("without such a form the states tell it themselves", "[rules]") {
+TEST_CASE("otherwise the states determine the meaning", "[rules]") {
   const auto third = [](const std::string& text) { return network_of(text).third; };
   // (x, x) is at rest in one meaning, (x, 0) in the other; (0, x) was thrown in MIMS.
   CHECK(third("@a mass 1 0 0") == delayed);
@@ -249,7 +249,7 @@ TEST_CASE("without such a form the states tell it themselves", "[rules]") {
 
 // --- R6 ----------------------------------------------------------------------------------------
 
-TEST_CASE("of a vector the third component swings, the others are drawn", "[rules]") {
+TEST_CASE("the third component of a vector moves, the others are for drawing", "[rules]") {
   const Network network = network_of(
       "@a mass 2. [1. 2. 3.] -100\n@g ground [4 5 6]\n@in1 posInput [7 8 9]\n"
       "@o osc 1 1 1 [1 1 1] [2 2 2]\n@c chain 4 1 1 1 [1 2 3] [4 5 6]\n@p mass 1 0 0\n");
@@ -265,9 +265,10 @@ TEST_CASE("of a vector the third component swings, the others are drawn", "[rule
   CHECK(drawn(network.masses[4].drawing) == Drawing{"", 7.0, 8.0});
   CHECK(drawn(network.macros[0].drawing) == Drawing{"", 1.0, 2.0});
   CHECK(network.masses[3].drawing == 0);
-  check_error("@a mass 1 [1 2] 0", 1, 11, "a place is one number or three, [x y z]; found 2");
-  check_error("@a mass 1 [] 0", 1, 11, "a place is one number or three, [x y z]; found 0");
-  check_error("@a mass 1 0 [1 2 3 4]", 1, 13, "a place is one number or three, [x y z]; found 4");
+  check_error("@a mass 1 [1 2] 0", 1, 11, "a position is one number or three, [x y z]; found 2");
+  check_error("@a mass 1 [] 0", 1, 11, "a position is one number or three, [x y z]; found 0");
+  check_error("@a mass 1 0 [1 2 3 4]", 1, 13,
+              "a position is one number or three, [x y z]; found 4");
   check_error("@a mass 1 [1 y 3] 0", 1, 14, "found 'y' where a number was expected");
   check_error("@a mass 1 [1 2 3", 1, 11, "this [ is never closed");
   check_error("@a mass 'p + 1 0 0", 1, 9, "this ' is never closed");
@@ -314,12 +315,12 @@ TEST_CASE("display triples and blocks are kept as groups", "[rules]") {
               "'osc' takes 5 to 6 arguments (M K Z [G] POSITION MOTION), found 8; a drawing is "
               "GROUP X Y, and '[1 2 3]' is no group");
   check_error("@a mass 1 0 0 skin x 0", 1, 20,
-              "found 'x' where a number was expected (a starting state is no parameter)");
+              "found 'x' where a number was expected (a state at the start cannot be a parameter)");
 }
 
 // --- R7 ----------------------------------------------------------------------------------------
 
-TEST_CASE("links may share a label, outputs a number, nothing else may", "[rules]") {
+TEST_CASE("only links may share a label, and only outputs a number", "[rules]") {
   check_told(
       two_masses + "@l spring @a @b 1\n@l damper @a @b 1\n@l spring @b @a 2\n" + heard,
       {{Severity::warning, 4, 1, 1, "'@l' is already declared in line 3; both links are kept"},
@@ -366,9 +367,9 @@ TEST_CASE("a plus adds, and a sum is scaled as a whole", "[rules]") {
 
 // --- R9 ----------------------------------------------------------------------------------------
 
-TEST_CASE("a slash that an editor has lost is put back, with a warning", "[rules]") {
+TEST_CASE("a slash that an editor lost is restored with a warning", "[rules]") {
   const std::string start = "@kScale param 0.3\n@k2 param 8\n" + two_masses + heard;
-  const std::string missing = "a '/' is missing, as MIMS4Max loses the first of a file; read as ";
+  const std::string missing = "a '/' is missing (MIMS4Max drops the first one of a file); read as ";
   check_told(start + "@l springDamper @a @b sqrt(kScale3) k2",
              {{Severity::warning, 6, 23, 1, missing + "'sqrt(kScale/3)'"}});
   check_told(start + "@l springDamper @a @b [0.1 * kScale12] k2",
@@ -377,16 +378,17 @@ TEST_CASE("a slash that an editor has lost is put back, with a warning", "[rules
   CHECK(link_value(network, 0) == std::sqrt(0.3 / 3));
   // A parameter of that very name is meant, and what has no digits behind it is a mistake.
   CHECK(link_value(network_of(start + "@l spring @a @b kScale*k2"), 0) == 0.3 * 8.0);
-  check_error(start + "@l spring @a @b kScal*k2", 6, 17, "'kScal' is no parameter of this model");
+  check_error(start + "@l spring @a @b kScal*k2", 6, 17,
+              "'kScal' is not a parameter of this model");
   check_error(start + "@l spring @a @b kScal", 6, 17,
-              "'kScal' is no parameter of this model; did you mean 'kScale'?");
+              "'kScal' is not a parameter of this model; did you mean 'kScale'?");
   check_error(start + "@l spring @a @b kScale3x", 6, 17,
-              "'kScale3x' is no parameter of this model; did you mean 'kScale'?");
+              "'kScale3x' is not a parameter of this model; did you mean 'kScale'?");
 }
 
 // --- R12 ---------------------------------------------------------------------------------------
 
-TEST_CASE("unusual networks are accepted, and told where they are hardly meant", "[rules]") {
+TEST_CASE("unusual networks are accepted with warnings", "[rules]") {
   check_warning(two_masses + "@l spring @a @b 1", 1, 1,
                 "the model has no output, so it will be silent");
   check_told(two_masses + "@l spring @a @b 1\n" + heard, {});
@@ -401,8 +403,8 @@ TEST_CASE("unusual networks are accepted, and told where they are hardly meant",
   check_warning(sounding + "@in1 posInput 0", 5, 1, "nothing is attached to '@in1'");
   check_warning(sounding + "@k spring @b @b 1", 5, 14,
                 "the link's two ends are the same mass: it has no effect");
-  check_warning(sounding + "@p param 1", 5, 1, "the parameter 'p' is used nowhere");
-  check_warning(sounding + "@p audioParam @in1", 5, 1, "the parameter 'p' is used nowhere");
+  check_warning(sounding + "@p param 1", 5, 1, "the parameter 'p' is never used");
+  check_warning(sounding + "@p audioParam @in1", 5, 1, "the parameter 'p' is never used");
   check_warning(
       sounding + "@in1 posInput 0\n@k contact @in1 @b 1 1 1", 6, 1,
       "the contact's ends look swapped: it acts while the second is below the first, here '@b' "
@@ -412,12 +414,12 @@ TEST_CASE("unusual networks are accepted, and told where they are hardly meant",
                 "'@in1' pushes '@g', which never moves: it does nothing");
   check_warning(sounding + "@in1 posInput 0\n@k spring @in1 @a 1\n@in2 frcInput @in1", 7, 1,
                 "'@in2' pushes '@in1', which moves only as its input says: it does nothing");
-  check_error("@p param 1", 1, 1, "the model has no masses: nothing can sound");
+  check_error("@p param 1", 1, 1, "the model has no masses, so it makes no sound");
   check_error("# nothing", 1, 1,
               "the model is empty: expected elements such as '@m mass 1. 0. 0.'");
 }
 
-TEST_CASE("a channel that is left out is told at the one behind it", "[rules]") {
+TEST_CASE("missing channels cause a warning", "[rules]") {
   const std::string sounding = two_masses + "@l spring @a @b 1\n";
   check_warning(sounding + "@out1 posOutput @a\n  @out3 posOutput @b\n", 5, 3,
                 "there is @out3, but no @out2");
@@ -451,7 +453,7 @@ TEST_CASE("gravity is divided by the reference rate in MIMS4Max, and not in MIMS
   CHECK(first_step("@m massG 2. 0.5 0. 0.", 88200.0, false) == -0.25);
 }
 
-TEST_CASE("numbers follow the rate unless they are taken raw", "[rules]") {
+TEST_CASE("coefficients follow the sample rate unless rescaling is off", "[rules]") {
   const Network network =
       network_of(two_masses +
                  "@s springDamper @a @b 8 4\n@w nlBow @a @b 8 4\n@k nlPluck @a @b 8 4 2\n"
@@ -475,7 +477,7 @@ TEST_CASE("numbers follow the rate unless they are taken raw", "[rules]") {
   CHECK(coefficients(44100.0, true, Law::bow) == std::vector{8.0, 4.0, 0.0});
 }
 
-TEST_CASE("a force and a hand act in the tick in which they come", "[rules]") {
+TEST_CASE("forces and positions act in the same sample", "[rules]") {
   support::Bare<double> struck(
       make_program(network_of("@m mass 2 0 0\n@in1 frcInput @m\n@in2 frcInput @m\n"
                               "@out1 posOutput @m\n@out2 frcOutput @m"),

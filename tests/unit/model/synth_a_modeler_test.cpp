@@ -90,7 +90,7 @@ TEST_CASE("a mass of a gram on 1000 N/m swings at 1000 rad/s", "[synth_a_modeler
   CHECK(std::fabs(most - 1e-3) < 1e-6);
 }
 
-TEST_CASE("a link rests where the first end is its offset above the second", "[synth_a_modeler]") {
+TEST_CASE("a link is at rest with its first end `offset` above the second", "[synth_a_modeler]") {
   for (const char* const ends : {"g,m", "m,g"}) {
     const std::vector<double> y =
         rendered(std::string("ground(0.0),g;\nmass(0.001,0.0,0.0),m;\nlink(1000.0,1.0,0.01),l,") +
@@ -100,7 +100,8 @@ TEST_CASE("a link rests where the first end is its offset above the second", "[s
   }
 }
 
-TEST_CASE("a touch acts where the first is more than its offset above", "[synth_a_modeler]") {
+TEST_CASE("a touch acts while its first end is more than `offset` above the second",
+          "[synth_a_modeler]") {
   const std::string text =
       "port(),hand;\nground(0.0),g;\nmass(0.001,0.0,0.0),m;\nlink(500.0,1.0,0.0),l,m,g;\n"
       "touch(500.0,0.0,0.002),t,hand,m;\naudioout,a,m;\n";
@@ -124,7 +125,7 @@ TEST_CASE("resonators are modes of one body at one place", "[synth_a_modeler]") 
   CHECK(network.modes[1].shape == std::vector<double>{0.5});  // sqrt(0.01/0.04)
 }
 
-TEST_CASE("guides between two terminations are one waveguide", "[synth_a_modeler]") {
+TEST_CASE("waveguides between two terminations are joined", "[synth_a_modeler]") {
   const Network network = network_of(string_of_two);
   REQUIRE(network.macros.size() == 1);
   const Macro& w = network.macros[0];
@@ -139,7 +140,7 @@ TEST_CASE("guides between two terminations are one waveguide", "[synth_a_modeler
   CHECK(std::fabs(value_of(network, network.taps[0].u) - 0.4) < 1e-12);
 }
 
-TEST_CASE("a waveguide sounds at one over the sum of its delays", "[synth_a_modeler]") {
+TEST_CASE("the frequency of a waveguide is one over the sum of its delays", "[synth_a_modeler]") {
   std::string text = string_of_two;
   text.replace(text.find("link(100.0,0.5"), 14, "touch(9.0,0.0");
   const Network network = expand_macros(network_of(text));
@@ -151,7 +152,7 @@ TEST_CASE("a waveguide sounds at one over the sum of its delays", "[synth_a_mode
   CHECK(std::fabs(measured_hz(y, fs, 200.0) - 200.0) < 0.05);
 }
 
-TEST_CASE("a termination's filter takes time and the high partials", "[synth_a_modeler]") {
+TEST_CASE("the filter of a termination adds delay and damps high partials", "[synth_a_modeler]") {
   const Network network = network_of(
       "faustcode: fc=5000.0;\nfaustcode: r=hslider(\"r\",-0.995,-1.0,0.0,0.001);\n"
       "port(),hand;\nlink(100.0,0.5,0.0),l,hand,j;\n"
@@ -197,14 +198,14 @@ TEST_CASE("sliders and constants are parameters", "[synth_a_modeler]") {
   CHECK(printed.network == network);
 }
 
-TEST_CASE("Synth-A-Modeler's mistakes are told with their lines", "[synth_a_modeler]") {
+TEST_CASE("errors in Synth-A-Modeler files have a line", "[synth_a_modeler]") {
   check_error("mass(1.0,0.0),m;\n", 1, 1, "expected mass(m,x0,v0),id;, found 2 arguments");
   check_error("mass(1.0,0.0,0.0),m\n", 1, 20, "the line ends where a ';' was expected");
   check_error("# a\n\nmass(1.0,0.0,0.0,m;\n", 3, 5, "this ( is never closed");
   check_error("port(),p;\nmas(1.0,0.0,0.0),m;\n", 2, 1,
               "expected an element of Synth-A-Modeler, found 'mas'; did you mean 'mass'?");
   check_error("mass(1.0,0.0,0.0),m;\nlink(1.0,0.0,0.0),l,m,n;\n", 2, 23,
-              "nothing is called 'n'; did you mean 'm'?");
+              "there is no element called 'n'; did you mean 'm'?");
   check_error("ground(0.0),g;\nground(0.0),g;\n", 2, 13, "'g' is already declared in line 1");
   check_error("mass(1.0,0.0,0.0),m;\npulseTouch(1.0,0.0,0.0,1.0,1.0,1.0),t,m,m;\n", 2, 1,
               "'pulseTouch' is not read: write a touch, and strike by a force input of a model of "
@@ -213,7 +214,7 @@ TEST_CASE("Synth-A-Modeler's mistakes are told with their lines", "[synth_a_mode
               "found 'highpass' where a number, a slider or a constant was expected; other FAUST "
               "code is not read");
   check_error("faustcode: a=b*2.0;\nfaustcode: b=a+1.0;\nport(),p;\n", 2, 14,
-              "'a' is defined by itself");
+              "'a' is defined in terms of itself");
   check_error("port(),p;\naudioout,a,p:lowpass(1,100.0);\n", 2, 13,
               "found ':lowpass(1,100.0)' where the ';' was expected: FAUST code behind what is "
               "heard is not read");
@@ -229,11 +230,11 @@ TEST_CASE("Synth-A-Modeler's mistakes are told with their lines", "[synth_a_mode
                   "termination(memorylessStringTerm(-0.9)),t;\n"
                   "waveguide(0.5,simpleString(0.02,0.002)),w2,t,j;\n",
               7, 15,
-              "a junction joins two waveguides, this one 3; more are not read: link "
+              "a junction joins two waveguides, but this one joins 3; more are not read: link "
               "junctions of two by a stiff link");
 }
 
-TEST_CASE("what is read as something else is said", "[synth_a_modeler]") {
+TEST_CASE("approximate translations cause a warning", "[synth_a_modeler]") {
   // What is found in our own language is told of the line that it comes from.
   check_warning(
       "port(),p;\nmass(1.0,0.0,0.0),m;\nlink(1.0,0.0,0.0),l,m,p;\n"
@@ -248,7 +249,7 @@ TEST_CASE("what is read as something else is said", "[synth_a_modeler]") {
   CHECK(value_of(pluck, pluck.links[0].arguments[1]) == 0.006);
 }
 
-TEST_CASE("an output is what its expression says", "[synth_a_modeler]") {
+TEST_CASE("output expressions are translated", "[synth_a_modeler]") {
   // By hand, of a = 1, b = 2.
   const auto levels = [](const std::string& heard) {
     const Network network = network_of(
@@ -277,21 +278,20 @@ TEST_CASE("an output is what its expression says", "[synth_a_modeler]") {
   CHECK(levels("(1.0+2.0)*(a+b*(s-1.0))") == 15.0);
   CHECK(levels("2.0*-a+b") == 0.0);
   CHECK(levels("a+a") == 2.0);
-  check_error("port(),p;\naudioout,a,p+1.0;\n", 2, 14,
-              "expected what is heard, found a number alone");
+  check_error("port(),p;\naudioout,a,p+1.0;\n", 2, 14, "expected a signal, found only a number");
   check_error("port(),p;\naudioout,a,(1.0+p)*2.0;\n", 2, 17,
-              "expected a number, as before; a number added to what is heard is silent");
+              "expected a number: a signal cannot be added to numbers in parentheses");
   check_error("port(),p;\naudioout,a,p*p;\n", 2, 13,
-              "what is heard may be multiplied by numbers, not by what else is heard");
+              "a signal may be multiplied by numbers, not by another signal");
 }
 
-TEST_CASE("our own language stays what it is", "[synth_a_modeler]") {
+TEST_CASE("files in our own language are not translated", "[synth_a_modeler]") {
   CHECK(network_of("# mass(1.0,0.0,0.0),m;\n@m osc 1. 0.1 0. 0. 0.\n@out1 posOutput @m\n")
             .masses.size() == 1);
   CHECK(parse_network("mass of a note\n@m osc 1. 0.1 0. 0. 0.\n@out1 posOutput @m\n").ok());
 }
 
-TEST_CASE("an element may be called as a channel of ours is", "[synth_a_modeler]") {
+TEST_CASE("an element may have the name of a channel", "[synth_a_modeler]") {
   const Network network = network_of(
       "mass(1.0,0.0,0.0),in1;\nmass(1.0,0.0,0.0),in1_;\nport(),q;\nlink(1.0,0.0,0.0),out1,in1,q;\n"
       "link(1.0,0.0,0.0),l,in1_,in1;\naudioout,a,in1;\n");
@@ -299,7 +299,7 @@ TEST_CASE("an element may be called as a channel of ours is", "[synth_a_modeler]
   CHECK(network.links[0].name.text() == "out1_");
 }
 
-TEST_CASE("no harm done to a text does harm", "[synth_a_modeler]") {
+TEST_CASE("damaged texts do not crash the translator", "[synth_a_modeler]") {
   const std::string pieces[] = {"(",
                                 ")",
                                 ",",
