@@ -125,39 +125,6 @@ struct FaustTerms {
   std::function<std::string(std::uint32_t mass)> inverse_mass;
 };
 
-// The links of an expanded network that hold a waveguide.
-class FaustPassive {
- public:
-  FaustPassive(const Network& network, std::span<const LawFacts> laws);
-
-  // Returns true for an end of such a link, and for every place on a waveguide.
-  bool is_held(std::uint32_t mass) const { return is_held_[mass]; }
-  bool holds(std::uint32_t link) const { return holds_[link]; }
-
-  // The reason why these links cannot be exported, with the line.
-  std::optional<Error> refusal() const;
-  // Names of the FAUST definitions that these links call.
-  std::set<std::string> definitions() const;
-  // The forces f_ of these links, and their sum h_ at every mass.
-  std::string text(const FaustTerms& terms) const;
-
- private:
-  const LawFacts& facts(std::uint32_t link) const {
-    return laws_[static_cast<std::size_t>(network_.links[link].law)];
-  }
-  std::string solver(std::uint32_t link) const;
-  std::string compliance(const FaustTerms& terms, std::uint32_t from, std::uint32_t at) const;
-  std::string compliance(const FaustTerms& terms, const Link& link) const;
-  std::string force(const FaustTerms& terms, std::uint32_t link) const;
-  std::string speed_before(const FaustTerms& terms, std::uint32_t end) const;
-
-  const Network& network_;
-  std::span<const LawFacts> laws_;
-  std::vector<bool> is_held_;             // [mass]
-  std::vector<bool> holds_;               // [link]
-  std::vector<std::uint32_t> neighbour_;  // [link] earlier link at the same mass, or itself
-};
-
 // Position and velocity of a link's end at the start, at the reference rate.
 struct Start {
   double position = 0.0;
@@ -236,176 +203,198 @@ Network join_springs(Network expanded, std::span<const LawFacts> laws) {
   return expanded;
 }
 
-FaustPassive::FaustPassive(const Network& network, std::span<const LawFacts> laws)
-    : network_(network),
-      laws_(laws),
-      is_held_(network.masses.size()),
-      holds_(network.links.size()) {
-  constexpr auto none = std::numeric_limits<std::uint32_t>::max();
-  std::vector<std::uint32_t> holder(network.masses.size(), none);
-  for (std::uint32_t i = 0; i < network.masses.size(); ++i) {
-    is_held_[i] = is_junction(network, i);
-  }
-  for (std::uint32_t i = 0; i < network.links.size(); ++i) {
-    const Link& link = network.links[i];
-    neighbour_.push_back(i);
-    if (!is_junction(network, link.a) && !is_junction(network, link.b)) {
-      continue;
+// The links of an expanded network that hold a waveguide.
+class FaustPassive {
+ public:
+  FaustPassive(const Network& network, std::span<const LawFacts> laws)
+      : network_(network),
+        laws_(laws),
+        is_held_(network.masses.size()),
+        holds_(network.links.size()) {
+    constexpr auto none = std::numeric_limits<std::uint32_t>::max();
+    std::vector<std::uint32_t> holder(network.masses.size(), none);
+    for (std::uint32_t i = 0; i < network.masses.size(); ++i) {
+      is_held_[i] = is_junction(network, i);
     }
-    holds_[i] = true;
-    for (const std::uint32_t end : {link.a, link.b}) {
-      is_held_[end] = true;
-      each_behind(network, end, [&](std::uint32_t mass) {
-        is_held_[mass] = true;  // the fixed ends of macros too
-        if (!gives_way(network, mass)) {
-          return;
-        }
-        if (holder[mass] != none && holder[mass] != i) {
-          neighbour_[i] = holder[mass];
-        }
-        holder[mass] = i;
-      });
-    }
-  }
-}
-
-std::optional<Error> FaustPassive::refusal() const {
-  for (std::uint32_t i = 0; i < neighbour_.size(); ++i) {
-    if (neighbour_[i] != i) {
-      const Link& link = network_.links[i];
-      return Error{"'" + std::string(link.name) + "' and '" +
-                       std::string(network_.links[neighbour_[i]].name) +
-                       "' move the same mass, body or place next to a waveguide. The FAUST export "
-                       "solves only one such link at a time. Attach them to different places and "
-                       "bodies, or remove one of them.",
-                   link.location.line, link.location.column};
-    }
-  }
-  return {};
-}
-
-// Returns the name of the definition that solves the link: start_ handles the first sample of a
-// link that is under tension as it starts.
-std::string FaustPassive::solver(std::uint32_t link) const {
-  const LawFacts& law = facts(link);
-  const bool is_tense = exerts_at_start(network_, network_.links[link], law);
-  return (is_tense ? "start_" : "alone_") + std::string(law.name);
-}
-
-std::set<std::string> FaustPassive::definitions() const {
-  std::set<std::string> names;
-  for (std::uint32_t i = 0; i < holds_.size(); ++i) {
-    if (holds_[i]) {
-      names.insert({"steady_" + std::string(facts(i).name), solver(i)});
-    }
-  }
-  return names;
-}
-
-// The displacement of one end by a force of 1 at another: a sum over the masses behind both. ""
-// for 0.
-std::string FaustPassive::compliance(const FaustTerms& terms, std::uint32_t from,
-                                     std::uint32_t at) const {
-  const auto behind = [&](std::uint32_t end) {
-    return network_.masses[end].kind == MassKind::point ? terms.shares(end)
-                                                        : std::vector<FaustShare>{{end, ""}};
-  };
-  std::vector<std::string> sum;
-  for (const FaustShare& pushed : behind(from)) {
-    for (const FaustShare& felt : behind(at)) {
-      if (pushed.node == felt.node && gives_way(network_, felt.node)) {
-        sum.push_back("+ " + pushed.factor + felt.factor + terms.inverse_mass(felt.node));
-      }
-    }
-  }
-  return sum.empty() ? "" : "(" + faust_sum(sum) + ")";
-}
-
-// The gamma of core/laws/discrete_gradient.h: how far the link's own force of 1 shortens it.
-std::string FaustPassive::compliance(const FaustTerms& terms, const Link& link) const {
-  std::vector<std::string> sum;
-  const std::uint32_t ends[] = {link.a, link.b};
-  for (const int from : {0, 1}) {
-    for (const int at : {0, 1}) {
-      if (const std::string by = compliance(terms, ends[from], ends[at]); !by.empty()) {
-        sum.push_back((from == at ? "+ " : "- ") + by);
-      }
-    }
-  }
-  return faust_sum(sum);
-}
-
-// The velocity of an end in the sample before.
-std::string FaustPassive::speed_before(const FaustTerms& terms, std::uint32_t end) const {
-  const std::string& name = terms.masses[end];
-  switch (network_.masses[end].kind) {
-    case MassKind::ground:
-      return "0.0";
-    case MassKind::position:
-      return "v_" + name + "'";
-    case MassKind::junction:
-      return "n_" + name;
-    default:
-      break;
-  }
-  const Start start = start_of(network_, end);
-  const std::string before = faust_number(start.position) +
-                             (start.speed == 0.0 ? "" : " - " + faust_number(start.speed) + "*r");
-  return "(o_" + name + " - was(" + before + ", o_" + name + "))";
-}
-
-// The force of one link. Its names: c_ is its distance two samples before the end of this one, e_
-// how fast that distance grew, s_ how far it would change without the link, gamma_ its compliance.
-// No damper acts in the first sample, where 1' is 0.
-std::string FaustPassive::force(const FaustTerms& terms, std::uint32_t index) const {
-  const Link& link = network_.links[index];
-  const LawFacts& law = facts(index);
-  const std::string& name = terms.links[index];
-  const std::string& a = terms.masses[link.a];
-  const std::string& b = terms.masses[link.b];
-  const std::string now = "o_" + a + " - o_" + b;
-  const std::string free = "y_" + a + " - y_" + b;
-  std::vector<std::string> arguments;
-  for (std::size_t i = 0; i < law.count; ++i) {
-    arguments.push_back(terms.scaled(link.arguments[i], law.arguments[i].unit));
-  }
-  const std::string all = flow(arguments, ", ", 6);
-  return "  e_" + name + " = " + speed_before(terms, link.a) + " - " + speed_before(terms, link.b) +
-         ";  c_" + name + " = " + now + " - e_" + name + ";  s_" + name + " = " +
-         (law.is_friction ? "e_" + name + " + u_" + a + " - u_" + b : free + " - c_" + name) +
-         ";  gamma_" + name + " = " + compliance(terms, link) + ";\n  rest_" + name + " = " + all +
-         ", " + now + ", e_" + name + ", " + free + " - c_" + name + " : steady_" +
-         std::string(law.name) + " : *(1'), *(1');\n  f_" + name + " = " + all + ", rest_" + name +
-         ", c_" + name + ", e_" + name + ", s_" + name + ", gamma_" + name + " : " + solver(index) +
-         ";\n";
-}
-
-std::string FaustPassive::text(const FaustTerms& terms) const {
-  std::string text;
-  std::vector<std::vector<std::string>> forces(network_.masses.size());
-  for (std::uint32_t i = 0; i < holds_.size(); ++i) {
-    if (!holds_[i]) {
-      continue;
-    }
-    text += force(terms, i);
-    const Link& link = network_.links[i];
-    for (const auto& [end, sign] : {std::pair(link.a, "- "), std::pair(link.b, "+ ")}) {
-      if (network_.masses[end].kind != MassKind::point) {
-        forces[end].push_back(sign + ("f_" + terms.links[i]));
+    for (std::uint32_t i = 0; i < network.links.size(); ++i) {
+      const Link& link = network.links[i];
+      neighbour_.push_back(i);
+      if (!is_junction(network, link.a) && !is_junction(network, link.b)) {
         continue;
       }
-      for (const FaustShare& share : terms.shares(end)) {
-        forces[share.node].push_back(sign + share.factor + "f_" + terms.links[i]);
+      holds_[i] = true;
+      for (const std::uint32_t end : {link.a, link.b}) {
+        is_held_[end] = true;
+        each_behind(network, end, [&](std::uint32_t mass) {
+          is_held_[mass] = true;  // the fixed ends of macros too
+          if (!gives_way(network, mass)) {
+            return;
+          }
+          if (holder[mass] != none && holder[mass] != i) {
+            neighbour_[i] = holder[mass];
+          }
+          holder[mass] = i;
+        });
       }
     }
   }
-  for (std::uint32_t i = 0; i < forces.size(); ++i) {
-    if (is_held_[i] && network_.masses[i].kind != MassKind::point) {
-      text += "  h_" + terms.masses[i] + " = " + faust_sum(forces[i]) + ";\n";
+
+  // Returns true for an end of such a link, and for every place on a waveguide.
+  bool is_held(std::uint32_t mass) const { return is_held_[mass]; }
+  bool holds(std::uint32_t link) const { return holds_[link]; }
+
+  // The reason why these links cannot be exported, with the line.
+  std::optional<Error> refusal() const {
+    for (std::uint32_t i = 0; i < neighbour_.size(); ++i) {
+      if (neighbour_[i] != i) {
+        const Link& link = network_.links[i];
+        return Error{
+            "'" + std::string(link.name) + "' and '" +
+                std::string(network_.links[neighbour_[i]].name) +
+                "' move the same mass, body or place next to a waveguide. The FAUST export "
+                "solves only one such link at a time. Attach them to different places and "
+                "bodies, or remove one of them.",
+            link.location.line, link.location.column};
+      }
     }
+    return {};
   }
-  return text;
-}
+
+  // Names of the FAUST definitions that these links call.
+  std::set<std::string> definitions() const {
+    std::set<std::string> names;
+    for (std::uint32_t i = 0; i < holds_.size(); ++i) {
+      if (holds_[i]) {
+        names.insert({"steady_" + std::string(facts(i).name), solver(i)});
+      }
+    }
+    return names;
+  }
+
+  // The forces f_ of these links, and their sum h_ at every mass.
+  std::string text(const FaustTerms& terms) const {
+    std::string text;
+    std::vector<std::vector<std::string>> forces(network_.masses.size());
+    for (std::uint32_t i = 0; i < holds_.size(); ++i) {
+      if (!holds_[i]) {
+        continue;
+      }
+      text += force(terms, i);
+      const Link& link = network_.links[i];
+      for (const auto& [end, sign] : {std::pair(link.a, "- "), std::pair(link.b, "+ ")}) {
+        if (network_.masses[end].kind != MassKind::point) {
+          forces[end].push_back(sign + ("f_" + terms.links[i]));
+          continue;
+        }
+        for (const FaustShare& share : terms.shares(end)) {
+          forces[share.node].push_back(sign + share.factor + "f_" + terms.links[i]);
+        }
+      }
+    }
+    for (std::uint32_t i = 0; i < forces.size(); ++i) {
+      if (is_held_[i] && network_.masses[i].kind != MassKind::point) {
+        text += "  h_" + terms.masses[i] + " = " + faust_sum(forces[i]) + ";\n";
+      }
+    }
+    return text;
+  }
+
+ private:
+  const LawFacts& facts(std::uint32_t link) const {
+    return laws_[static_cast<std::size_t>(network_.links[link].law)];
+  }
+  // Returns the name of the definition that solves the link: start_ handles the first sample of a
+  // link that is under tension as it starts.
+  std::string solver(std::uint32_t link) const {
+    const LawFacts& law = facts(link);
+    const bool is_tense = exerts_at_start(network_, network_.links[link], law);
+    return (is_tense ? "start_" : "alone_") + std::string(law.name);
+  }
+
+  // The displacement of one end by a force of 1 at another: a sum over the masses behind both. ""
+  // for 0.
+  std::string compliance(const FaustTerms& terms, std::uint32_t from, std::uint32_t at) const {
+    const auto behind = [&](std::uint32_t end) {
+      return network_.masses[end].kind == MassKind::point ? terms.shares(end)
+                                                          : std::vector<FaustShare>{{end, ""}};
+    };
+    std::vector<std::string> sum;
+    for (const FaustShare& pushed : behind(from)) {
+      for (const FaustShare& felt : behind(at)) {
+        if (pushed.node == felt.node && gives_way(network_, felt.node)) {
+          sum.push_back("+ " + pushed.factor + felt.factor + terms.inverse_mass(felt.node));
+        }
+      }
+    }
+    return sum.empty() ? "" : "(" + faust_sum(sum) + ")";
+  }
+
+  // The gamma of core/laws/discrete_gradient.h: how far the link's own force of 1 shortens it.
+  std::string compliance(const FaustTerms& terms, const Link& link) const {
+    std::vector<std::string> sum;
+    const std::uint32_t ends[] = {link.a, link.b};
+    for (const int from : {0, 1}) {
+      for (const int at : {0, 1}) {
+        if (const std::string by = compliance(terms, ends[from], ends[at]); !by.empty()) {
+          sum.push_back((from == at ? "+ " : "- ") + by);
+        }
+      }
+    }
+    return faust_sum(sum);
+  }
+
+  // The force of one link. Its names: c_ is its distance two samples before the end of this one, e_
+  // how fast that distance grew, s_ how far it would change without the link, gamma_ its
+  // compliance. No damper acts in the first sample, where 1' is 0.
+  std::string force(const FaustTerms& terms, std::uint32_t index) const {
+    const Link& link = network_.links[index];
+    const LawFacts& law = facts(index);
+    const std::string& name = terms.links[index];
+    const std::string& a = terms.masses[link.a];
+    const std::string& b = terms.masses[link.b];
+    const std::string now = "o_" + a + " - o_" + b;
+    const std::string free = "y_" + a + " - y_" + b;
+    std::vector<std::string> arguments;
+    for (std::size_t i = 0; i < law.count; ++i) {
+      arguments.push_back(terms.scaled(link.arguments[i], law.arguments[i].unit));
+    }
+    const std::string all = flow(arguments, ", ", 6);
+    return "  e_" + name + " = " + speed_before(terms, link.a) + " - " +
+           speed_before(terms, link.b) + ";  c_" + name + " = " + now + " - e_" + name + ";  s_" +
+           name + " = " +
+           (law.is_friction ? "e_" + name + " + u_" + a + " - u_" + b : free + " - c_" + name) +
+           ";  gamma_" + name + " = " + compliance(terms, link) + ";\n  rest_" + name + " = " +
+           all + ", " + now + ", e_" + name + ", " + free + " - c_" + name + " : steady_" +
+           std::string(law.name) + " : *(1'), *(1');\n  f_" + name + " = " + all + ", rest_" +
+           name + ", c_" + name + ", e_" + name + ", s_" + name + ", gamma_" + name + " : " +
+           solver(index) + ";\n";
+  }
+
+  // The velocity of an end in the sample before.
+  std::string speed_before(const FaustTerms& terms, std::uint32_t end) const {
+    const std::string& name = terms.masses[end];
+    switch (network_.masses[end].kind) {
+      case MassKind::ground:
+        return "0.0";
+      case MassKind::position:
+        return "v_" + name + "'";
+      case MassKind::junction:
+        return "n_" + name;
+      default:
+        break;
+    }
+    const Start start = start_of(network_, end);
+    const std::string before = faust_number(start.position) +
+                               (start.speed == 0.0 ? "" : " - " + faust_number(start.speed) + "*r");
+    return "(o_" + name + " - was(" + before + ", o_" + name + "))";
+  }
+
+  const Network& network_;
+  std::span<const LawFacts> laws_;
+  std::vector<bool> is_held_;             // [mass]
+  std::vector<bool> holds_;               // [link]
+  std::vector<std::uint32_t> neighbour_;  // [link] earlier link at the same mass, or itself
+};
 
 // --- waveguides --------------------------------------------------------------------------------
 //
@@ -469,22 +458,177 @@ std::optional<Error> faust_refusal(const Network& network, std::span<const LawFa
 class FaustWaveguides {
  public:
   FaustWaveguides(const Network& network, const FaustPassive& passive,
-                  std::span<const LawFacts> laws);
+                  std::span<const LawFacts> laws)
+      : network_(network), passive_(passive) {
+    std::vector<std::vector<double>> held(network.waveguides.size());
+    for (const Link& link : network.links) {
+      for (const std::uint32_t end : {link.a, link.b}) {
+        if (is_junction(network, end) && laws[static_cast<std::size_t>(link.law)].contains_spring) {
+          held[network.taps[network.masses[end].tap].macro].push_back(coordinate(end));
+        }
+      }
+    }
+    FaustNames names;
+    for (std::uint32_t g = 0; g < network.waveguides.size(); ++g) {
+      guides_.push_back({.name = names.add(network.waveguides[g].name),
+                         .macro = &network.waveguides[g],
+                         .filters = filters_between(held[g]),
+                         .passes = {}});
+    }
+    for (std::uint32_t i = 0; i < network.masses.size(); ++i) {
+      if (is_junction(network, i)) {
+        auto& passes = guides_[network.taps[network.masses[i].tap].macro].passes;
+        passes.push_back({i, false});
+        passes.push_back({i, true});
+      }
+    }
+    std::erase_if(guides_, [](const Guide& guide) { return guide.passes.empty(); });
+    for (Guide& guide : guides_) {
+      const auto rank = [&](const Pass& pass) {
+        return order_from_filters(guide.filters, coordinate(pass.mass), pass.runs_right);
+      };
+      std::stable_sort(guide.passes.begin(), guide.passes.end(),
+                       [&](const Pass& a, const Pass& b) { return rank(a) < rank(b); });
+    }
+  }
 
   // Names of the signals that are fed back, with the prefix "n" or "to": waves and positions, and
   // the velocities of driven masses.
-  std::vector<std::string> later(const FaustTerms& terms, const std::string& prefix) const;
+  std::vector<std::string> later(const FaustTerms& terms, const std::string& prefix) const {
+    std::vector<std::string> words;
+    for (std::uint32_t i = 0; i < network_.masses.size(); ++i) {
+      if (is_junction(network_, i)) {
+        words.push_back(prefix + "_" + terms.masses[i]);
+      }
+      if (passive_.is_held(i) && (moves(network_.masses[i]) || is_junction(network_, i))) {
+        words.push_back(prefix + "x_" + terms.masses[i]);
+      }
+      if (passive_.is_held(i) && moves(network_.masses[i]) &&
+          drives_itself(network_, network_.masses[i])) {
+        words.push_back(prefix + "v_" + terms.masses[i]);
+      }
+    }
+    for (const Guide& guide : guides_) {
+      for (std::size_t k = 0; k <= guide.passes.size(); ++k) {
+        words.push_back(prefix + "b_" + guide.name + "_" + std::to_string(k));
+      }
+    }
+    return words;
+  }
+
   // Names of the signals that carry each waveguide's filter coefficients and the positions of its
   // places into the model. As plain definitions FAUST would evaluate them again at every use, which
   // takes forever.
-  std::vector<std::string> numbers() const;
+  std::vector<std::string> numbers() const {
+    std::vector<std::string> words;
+    for (const Guide& guide : guides_) {
+      for (const char* what : {"samples_", "allpass_", "pole_", "gain_"}) {
+        words.push_back(what + guide.name);
+      }
+      for (std::size_t k = 0; k < guide.passes.size(); ++k) {
+        words.push_back("d_" + guide.name + "_" + std::to_string(k + 1));
+      }
+    }
+    return words;
+  }
+
   // The text that feeds these signals into the model, before its inputs.
-  std::string feed(int inputs) const;
-  std::string guides(const FaustTerms& terms) const;
+  std::string feed(int inputs) const {
+    std::string text;
+    for (const Guide& guide : guides_) {
+      text += (text.empty() ? "guide_" : ", guide_") + guide.name;
+    }
+    if (!text.empty() && inputs > 0) {
+      text += ", par(i, " + std::to_string(inputs) + ", _)";
+    }
+    return text.empty() ? "" : text + " : ";
+  }
+
+  std::string guides(const FaustTerms& terms) const {
+    std::string text;
+    for (const Guide& guide : guides_) {
+      const std::string& name = guide.name;
+      const std::size_t count = guide.passes.size();
+      std::vector<std::string> places;
+      for (std::size_t k = 0; k < count; ++k) {
+        places.push_back("d" + std::to_string(k + 1));
+      }
+      places.insert(places.begin(), {"samples", "allpass", "pole", "gain"});
+      text += "\nguide_" + name + " = guide(" + faust_number(static_cast<double>(count + 2)) +
+              ", " + terms.value(guide.macro->frequency_hz) + ", " +
+              terms.value(guide.macro->t60_s) + ", " + terms.value(guide.macro->brightness) +
+              ") : places\nwith {\n" + "  places(samples, period, allpass, pole, gain) =\n    " +
+              flow(places, ", ", 4) + "\n  with {\n";
+      // Each place takes the nearest sample that is free: a pass forwards, then one backwards.
+      for (std::size_t k = 0; k < count; ++k) {
+        const Pass& pass = guide.passes[k];
+        text += "    n" + std::to_string(k + 1) + " = max(" +
+                (k == 0 ? "1.0" : "n" + std::to_string(k) + " + 1.0") + ", nearest(" +
+                faust_number(guide.filters.share) + ", " + faust_number(guide.filters.to_held) +
+                ", " + faust_number(coordinate(pass.mass)) + ", " + (pass.runs_right ? "1" : "0") +
+                ", period));\n";
+      }
+      for (std::size_t k = count; k-- > 0;) {
+        const std::string n = std::to_string(k + 1);
+        text += "    d" + n + " = min(n" + n + ", " +
+                (k + 1 == count ? "samples" : "d" + std::to_string(k + 2) + " - 1.0") + ");\n";
+      }
+      text += "  };\n};\n";
+    }
+    return text;
+  }
+
   // The line of a place; `outside` is the force from outside.
-  std::string place(const FaustTerms& terms, std::uint32_t mass, const std::string& outside) const;
+  std::string place(const FaustTerms& terms, std::uint32_t mass, const std::string& outside) const {
+    const std::string& name = terms.masses[mass];
+    const Guide& guide = *std::find_if(guides_.begin(), guides_.end(), [&](const Guide& any) {
+      return any.macro == &guide_of(network_, mass);
+    });
+    const std::string sign = guide.macro->kind == MacroKind::open_waveguide ? " + " : " - ";
+    std::string left;
+    std::string right;
+    for (std::size_t k = 0; k < guide.passes.size(); ++k) {
+      if (guide.passes[k].mass == mass) {
+        (guide.passes[k].runs_right ? right : left) =
+            "in_" + guide.name + "_" + std::to_string(k + 1);
+      }
+    }
+    const std::string give = terms.inverse_mass(mass);
+    return "u_" + name + " = 2.0*(" + right + sign + left + ") - n_" + name +
+           (outside == "0.0" ? "" : " + (" + outside + ")*" + give) + ";  o_" + name + " = nx_" +
+           name + " + first(" + faust_number(network_.masses[mass].position) + ");  y_" + name +
+           " = o_" + name + " + u_" + name + ";  v_" + name + " = u_" + name + " + h_" + name +
+           "*" + give + ";  x_" + name + " = o_" + name + " + v_" + name + ";  w_" + name +
+           " = 0.5*(v_" + name + " + n_" + name + ") - " + right + (sign == " + " ? " - " : " + ") +
+           left + ";  to_" + name + " = v_" + name + ";  tox_" + name + " = x_" + name + ";";
+  }
+
   // The lines of the waves between the places.
-  std::string waves(const FaustTerms& terms) const;
+  std::string waves(const FaustTerms& terms) const {
+    std::string text;
+    for (const Guide& guide : guides_) {
+      const std::string& name = guide.name;
+      const std::size_t count = guide.passes.size();
+      const Formula& hz = network_.arguments[guide.macro->frequency_hz];
+      const double lowest = is_constant(hz) ? std::max(evaluate(hz, {}), lowest_hz) : lowest_hz;
+      const std::string most = faust_number(std::ceil(highest_rate_hz / lowest) + 2.0);
+      for (std::size_t k = 0; k < count; ++k) {
+        const std::string here = name + "_" + std::to_string(k + 1);
+        const std::string before = name + "_" + std::to_string(k);
+        const bool turns =
+            !guide.passes[k].runs_right && guide.macro->kind != MacroKind::open_waveguide;
+        text += "  in_" + here + " = late(" + most + ", d_" + here +
+                (k == 0 ? "" : " - d_" + before) + " - 1.0, nb_" + before + ");  tob_" + here +
+                " = in_" + here + (turns ? " - w_" : " + w_") + terms.masses[guide.passes[k].mass] +
+                ";\n";
+      }
+      const std::string last = name + "_" + std::to_string(count);
+      text += "  tob_" + name + "_0 = filtered(allpass_" + name + ", pole_" + name + ", gain_" +
+              name + ", late(" + most + ", samples_" + name + " - d_" + last + ", tob_" + last +
+              "));\n";
+    }
+    return text;
+  }
 
  private:
   struct Pass {  // a wave passes a place
@@ -498,184 +642,15 @@ class FaustWaveguides {
     std::vector<Pass> passes;  // in the order of the wave, from the filters on
   };
 
-  double coordinate(std::uint32_t mass) const;
+  double coordinate(std::uint32_t mass) const {
+    const ArgumentId u = network_.taps[network_.masses[mass].tap].u;
+    return u == no_argument ? 0.0 : evaluate(network_.arguments[u], {});
+  }
 
   const Network& network_;
   const FaustPassive& passive_;
   std::vector<Guide> guides_;
 };
-
-FaustWaveguides::FaustWaveguides(const Network& network, const FaustPassive& passive,
-                                 std::span<const LawFacts> laws)
-    : network_(network), passive_(passive) {
-  std::vector<std::vector<double>> held(network.waveguides.size());
-  for (const Link& link : network.links) {
-    for (const std::uint32_t end : {link.a, link.b}) {
-      if (is_junction(network, end) && laws[static_cast<std::size_t>(link.law)].contains_spring) {
-        held[network.taps[network.masses[end].tap].macro].push_back(coordinate(end));
-      }
-    }
-  }
-  FaustNames names;
-  for (std::uint32_t g = 0; g < network.waveguides.size(); ++g) {
-    guides_.push_back({.name = names.add(network.waveguides[g].name),
-                       .macro = &network.waveguides[g],
-                       .filters = filters_between(held[g]),
-                       .passes = {}});
-  }
-  for (std::uint32_t i = 0; i < network.masses.size(); ++i) {
-    if (is_junction(network, i)) {
-      auto& passes = guides_[network.taps[network.masses[i].tap].macro].passes;
-      passes.push_back({i, false});
-      passes.push_back({i, true});
-    }
-  }
-  std::erase_if(guides_, [](const Guide& guide) { return guide.passes.empty(); });
-  for (Guide& guide : guides_) {
-    const auto rank = [&](const Pass& pass) {
-      return order_from_filters(guide.filters, coordinate(pass.mass), pass.runs_right);
-    };
-    std::stable_sort(guide.passes.begin(), guide.passes.end(),
-                     [&](const Pass& a, const Pass& b) { return rank(a) < rank(b); });
-  }
-}
-
-double FaustWaveguides::coordinate(std::uint32_t mass) const {
-  const ArgumentId u = network_.taps[network_.masses[mass].tap].u;
-  return u == no_argument ? 0.0 : evaluate(network_.arguments[u], {});
-}
-
-std::vector<std::string> FaustWaveguides::later(const FaustTerms& terms,
-                                                const std::string& prefix) const {
-  std::vector<std::string> words;
-  for (std::uint32_t i = 0; i < network_.masses.size(); ++i) {
-    if (is_junction(network_, i)) {
-      words.push_back(prefix + "_" + terms.masses[i]);
-    }
-    if (passive_.is_held(i) && (moves(network_.masses[i]) || is_junction(network_, i))) {
-      words.push_back(prefix + "x_" + terms.masses[i]);
-    }
-    if (passive_.is_held(i) && moves(network_.masses[i]) &&
-        drives_itself(network_, network_.masses[i])) {
-      words.push_back(prefix + "v_" + terms.masses[i]);
-    }
-  }
-  for (const Guide& guide : guides_) {
-    for (std::size_t k = 0; k <= guide.passes.size(); ++k) {
-      words.push_back(prefix + "b_" + guide.name + "_" + std::to_string(k));
-    }
-  }
-  return words;
-}
-
-std::vector<std::string> FaustWaveguides::numbers() const {
-  std::vector<std::string> words;
-  for (const Guide& guide : guides_) {
-    for (const char* what : {"samples_", "allpass_", "pole_", "gain_"}) {
-      words.push_back(what + guide.name);
-    }
-    for (std::size_t k = 0; k < guide.passes.size(); ++k) {
-      words.push_back("d_" + guide.name + "_" + std::to_string(k + 1));
-    }
-  }
-  return words;
-}
-
-std::string FaustWaveguides::feed(int inputs) const {
-  std::string text;
-  for (const Guide& guide : guides_) {
-    text += (text.empty() ? "guide_" : ", guide_") + guide.name;
-  }
-  if (!text.empty() && inputs > 0) {
-    text += ", par(i, " + std::to_string(inputs) + ", _)";
-  }
-  return text.empty() ? "" : text + " : ";
-}
-
-std::string FaustWaveguides::guides(const FaustTerms& terms) const {
-  std::string text;
-  for (const Guide& guide : guides_) {
-    const std::string& name = guide.name;
-    const std::size_t count = guide.passes.size();
-    std::vector<std::string> places;
-    for (std::size_t k = 0; k < count; ++k) {
-      places.push_back("d" + std::to_string(k + 1));
-    }
-    places.insert(places.begin(), {"samples", "allpass", "pole", "gain"});
-    text += "\nguide_" + name + " = guide(" + faust_number(static_cast<double>(count + 2)) + ", " +
-            terms.value(guide.macro->frequency_hz) + ", " + terms.value(guide.macro->t60_s) + ", " +
-            terms.value(guide.macro->brightness) + ") : places\nwith {\n" +
-            "  places(samples, period, allpass, pole, gain) =\n    " + flow(places, ", ", 4) +
-            "\n  with {\n";
-    // Each place takes the nearest sample that is free: a pass forwards, then one backwards.
-    for (std::size_t k = 0; k < count; ++k) {
-      const Pass& pass = guide.passes[k];
-      text += "    n" + std::to_string(k + 1) + " = max(" +
-              (k == 0 ? "1.0" : "n" + std::to_string(k) + " + 1.0") + ", nearest(" +
-              faust_number(guide.filters.share) + ", " + faust_number(guide.filters.to_held) +
-              ", " + faust_number(coordinate(pass.mass)) + ", " + (pass.runs_right ? "1" : "0") +
-              ", period));\n";
-    }
-    for (std::size_t k = count; k-- > 0;) {
-      const std::string n = std::to_string(k + 1);
-      text += "    d" + n + " = min(n" + n + ", " +
-              (k + 1 == count ? "samples" : "d" + std::to_string(k + 2) + " - 1.0") + ");\n";
-    }
-    text += "  };\n};\n";
-  }
-  return text;
-}
-
-std::string FaustWaveguides::place(const FaustTerms& terms, std::uint32_t mass,
-                                   const std::string& outside) const {
-  const std::string& name = terms.masses[mass];
-  const Guide& guide = *std::find_if(guides_.begin(), guides_.end(), [&](const Guide& any) {
-    return any.macro == &guide_of(network_, mass);
-  });
-  const std::string sign = guide.macro->kind == MacroKind::open_waveguide ? " + " : " - ";
-  std::string left;
-  std::string right;
-  for (std::size_t k = 0; k < guide.passes.size(); ++k) {
-    if (guide.passes[k].mass == mass) {
-      (guide.passes[k].runs_right ? right : left) =
-          "in_" + guide.name + "_" + std::to_string(k + 1);
-    }
-  }
-  const std::string give = terms.inverse_mass(mass);
-  return "u_" + name + " = 2.0*(" + right + sign + left + ") - n_" + name +
-         (outside == "0.0" ? "" : " + (" + outside + ")*" + give) + ";  o_" + name + " = nx_" +
-         name + " + first(" + faust_number(network_.masses[mass].position) + ");  y_" + name +
-         " = o_" + name + " + u_" + name + ";  v_" + name + " = u_" + name + " + h_" + name + "*" +
-         give + ";  x_" + name + " = o_" + name + " + v_" + name + ";  w_" + name + " = 0.5*(v_" +
-         name + " + n_" + name + ") - " + right + (sign == " + " ? " - " : " + ") + left +
-         ";  to_" + name + " = v_" + name + ";  tox_" + name + " = x_" + name + ";";
-}
-
-std::string FaustWaveguides::waves(const FaustTerms& terms) const {
-  std::string text;
-  for (const Guide& guide : guides_) {
-    const std::string& name = guide.name;
-    const std::size_t count = guide.passes.size();
-    const Formula& hz = network_.arguments[guide.macro->frequency_hz];
-    const double lowest = is_constant(hz) ? std::max(evaluate(hz, {}), lowest_hz) : lowest_hz;
-    const std::string most = faust_number(std::ceil(highest_rate_hz / lowest) + 2.0);
-    for (std::size_t k = 0; k < count; ++k) {
-      const std::string here = name + "_" + std::to_string(k + 1);
-      const std::string before = name + "_" + std::to_string(k);
-      const bool turns =
-          !guide.passes[k].runs_right && guide.macro->kind != MacroKind::open_waveguide;
-      text += "  in_" + here + " = late(" + most + ", d_" + here +
-              (k == 0 ? "" : " - d_" + before) + " - 1.0, nb_" + before + ");  tob_" + here +
-              " = in_" + here + (turns ? " - w_" : " + w_") + terms.masses[guide.passes[k].mass] +
-              ";\n";
-    }
-    const std::string last = name + "_" + std::to_string(count);
-    text += "  tob_" + name + "_0 = filtered(allpass_" + name + ", pole_" + name + ", gain_" +
-            name + ", late(" + most + ", samples_" + name + " - d_" + last + ", tob_" + last +
-            "));\n";
-  }
-  return text;
-}
 
 // --- the program -------------------------------------------------------------------------------
 

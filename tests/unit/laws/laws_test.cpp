@@ -81,7 +81,6 @@ TEST_CASE("the facts of every law are complete, and its name is unique", "[laws]
     CHECK(facts_of(type.law).name == law.name);
     CHECK(names.insert(law.name).second);
     CHECK((!law.one.empty() && !law.many.empty()));
-    CHECK(law.faust.starts_with(std::string(law.name) + "("));
     CHECK(law.has(Role::damping));
     CHECK((law.is_friction) != law.has(Role::stiffness));
     CHECK((law.zone == Zone::everywhere || law.has(Role::reach)));
