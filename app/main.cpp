@@ -1,4 +1,4 @@
-// app: the program ressort.
+// The program ressort.
 #include "app/command_line/command_line.h"
 #include "app/program.h"
 

@@ -5,6 +5,9 @@
 
 namespace ressort {
 
+// Figures stand alone.
+namespace plot {}
+
 namespace realtime {
 using namespace engine;
 }
@@ -31,6 +34,7 @@ namespace commands {
 using namespace identification;
 using namespace solids;
 using namespace panel;
+using namespace plot;
 }  // namespace commands
 
 namespace command_line {

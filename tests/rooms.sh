@@ -35,9 +35,8 @@ judge() {
       owner["sndfile"] = "app/session/sound_file.cpp"
       owner["histedit.h"] = "app/control/terminal.cpp"
       owner["editline/"] = "app/control/terminal.cpp"
-      owner["ebur128.h"] = "app/commands/gallery/loudness.cpp"
+      owner["ebur128.h"] = "app/commands/gallery/sound.cpp"
       owner["httplib.h"] = "app/panel/panel.cpp"
-      owner["png.h"] = "app/commands/gallery/png.cpp"
       owner["CLI/"] = "app/command_line/"
       owner["atomic"] = "app/realtime/lockfree.h"
       owner["toml++/"] = "core/model/"
@@ -65,7 +64,8 @@ judge() {
       sees["app/session"] = all " app app/realtime app/session app/control/registry.h"
       sees["app/control"] = all " app app/realtime app/devices app/session app/control"
       sees["app/panel"] = sees["app/control"] " app/panel"
-      sees["app/commands"] = sees["app/panel"] " core/identification core/solids app/commands"
+      sees["app/plot"] = "core/result.h app app/plot"
+      sees["app/commands"] = sees["app/panel"] " core/identification core/solids app/plot app/commands"
       sees["app/command_line"] = sees["app/commands"] " app/command_line"
       sees["app"] = sees["app/command_line"]
     }

@@ -11,11 +11,11 @@
 namespace ressort::command_line {
 
 int run_command_line(int argc, char** argv) {
-  CLI::App app{"ressort plays networks of masses and springs, read from .mdl files."};
+  CLI::App app{"ressort simulates networks of masses and springs and plays them live."};
   app.footer(
       "Start with 'ressort play', then type 'help' at its prompt.\n"
-      "'ressort COMMAND --help' tells more of each command.\n"
-      "Exit codes: 0 done, 1 our failure, 2 wrong use or unreadable input, 75 no audio.");
+      "'ressort COMMAND --help' explains a command.\n"
+      "Exit codes: 0 success, 1 failure, 2 wrong arguments or unreadable input, 75 no audio.");
   app.set_version_flag("-V,--version", std::string("ressort ") + version + ", commit " + commit);
   app.name("ressort");
   app.require_subcommand(0, 1);
@@ -48,7 +48,7 @@ int run_command_line(int argc, char** argv) {
     return app.exit(error) == 0 ? exit_code::done : exit_code::wrong_use;
   }
   if (app.get_subcommands().empty() && std::getenv("NSM_URL") != nullptr) {
-    return play(play_options);  // a session manager starts programs by their names alone
+    return play(play_options);  // session managers start programs without arguments
   }
   if (app.get_subcommands().empty()) {
     std::fprintf(stderr, "%s", app.help().c_str());

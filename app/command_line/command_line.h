@@ -1,11 +1,11 @@
-// app/command_line: the command line, turned into one of the commands.
+// app/command_line: parses the command line and runs a command.
 #pragma once
 
 #include "app/rooms.h"
 
 namespace ressort::command_line {
 
-// Reads what was said and does it; the exit code comes back. [main]
+// Parses the arguments and runs the command. Returns the exit code. [main]
 int run_command_line(int argc, char** argv);
 
 }  // namespace ressort::command_line

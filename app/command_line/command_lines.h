@@ -1,4 +1,4 @@
-// app/command_line: what each command takes.
+// app/command_line: the options of each command.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -8,12 +8,12 @@
 #include <vector>
 
 #include "app/commands/body/body.h"
+#include "app/commands/chart/chart.h"
 #include "app/commands/check.h"
 #include "app/commands/commands.h"
 #include "app/commands/export.h"
 #include "app/commands/make.h"
 #include "app/commands/modes/modes.h"
-#include "app/commands/start_chart.h"
 #include "app/commands/timbre/describe.h"
 #include "app/commands/timbre/shape_model.h"
 
@@ -32,8 +32,8 @@ struct MakeChoice {
   std::vector<std::uint32_t> sizes;
 };
 
-// Adds a command to the program. The options are the caller's until the command has run; `code` is
-// what it ended with. [main]
+// Adds a command to the program. Parsing fills the options, runs the command and sets its exit
+// code. The options and `code` must outlive `app`. [main]
 void add_play(CLI::App& app, PlayOptions& options, int& code);
 void add_render(CLI::App& app, RenderChoice& choice, int& code);
 void add_check(CLI::App& app, CheckOptions& options, int& code);

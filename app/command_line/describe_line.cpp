@@ -9,12 +9,13 @@ namespace ressort::command_line {
 namespace {
 
 const char* const describe_examples =
-    "A sound file is described as it is, the mean of its channels. A preset is rendered, one "
-    "note.\n"
-    "A model without one is told from its modes, in closed form, if it is linear. Definitions are\n"
-    "those of the Timbre Toolbox (2011), in Hz; windows are periodic, and nothing is padded. What "
-    "a\n"
-    "sound does not have is null.\n"
+    "Sound files are analysed as the mean of their channels. Of a preset, one rendered note is "
+    "analysed.\n"
+    "Linear models without a preset are analysed in closed form, from their modes. Figures are "
+    "defined as\n"
+    "in the Timbre Toolbox (Peeters et al., 2011), in Hz, with periodic windows and without "
+    "padding. In\n"
+    "JSON, figures that a sound does not have are null.\n"
     "Examples:\n"
     "  ressort describe bell.wav\n"
     "  ressort describe PolyTriangle -o triangle.svg\n"
@@ -22,7 +23,7 @@ const char* const describe_examples =
     "  ressort describe SixStructures --sweep timbre=1:6:51 -o mixes.csv -o mixes.svg\n"
     "  ressort describe bell.wav --json --f0 220 | jq '.frames[].inharmonicity'\n";
 
-// A whole number within a range, and nothing else.
+// Accepts whole numbers within a range.
 CLI::Validator whole(double least, double most) {
   const std::string range = print_number(least) + " to " + print_number(most);
   return {[=](std::string& text) {
@@ -39,23 +40,24 @@ CLI::Validator whole(double least, double most) {
 }  // namespace
 
 void add_describe(CLI::App& app, DescribeOptions& options, int& code) {
-  CLI::App* command = app.add_subcommand(
-      "describe", "tells what a sound is like: bright or dark, hollow, noisy, long, in figures");
+  CLI::App* command =
+      app.add_subcommand("describe", "measures a sound: brightness, hollowness, noise, length");
   command->footer(describe_examples);
-  command->add_option("FILE", options.name, "a sound file, or a preset's or a model's name or file")
+  command->add_option("FILE", options.name, "sound file, preset or model, by name or file")
+      ->type_name("NAME")
       ->required();
-  command->add_flag("--json", options.as_json, "for machines, every frame");
+  command->add_flag("--json", options.as_json, "print JSON with every frame");
   command
       ->add_option("-o,--output", options.outputs,
-                   "an .svg of the spectrum and of how it goes on; of a sweep one of figures over "
-                   "the\nparameter, and a .csv of all of them (else to stdout)")
+                   ".svg of the spectrum and its course; of a sweep also a .csv")
+      ->type_name("FILE")
       ->take_all()
       ->allow_extra_args(false);
   add_overwrite(*command, options.force);
-  command->add_option("--frame", options.how.frame, "samples of a frame")
+  command->add_option("--frame", options.how.frame, "frame length in samples")
       ->check(whole(4.0, 65536.0))
       ->capture_default_str();
-  command->add_option("--hop", options.how.hop, "samples from frame to frame")
+  command->add_option("--hop", options.how.hop, "hop size in samples")
       ->check(whole(1.0, 1048576.0))
       ->capture_default_str();
   add_choice<Window>(*command, "--window", options.how.window,
@@ -63,39 +65,38 @@ void add_describe(CLI::App& app, DescribeOptions& options, int& code) {
                       {"hamming", Window::hamming},
                       {"blackman", Window::blackman},
                       {"none", Window::none}},
-                     "of each frame");
+                     "window");
   add_choice<SpectrumKind>(*command, "--spectrum", options.how.kind,
                            {{"magnitude", SpectrumKind::magnitude}, {"power", SpectrumKind::power}},
-                           "what is described");
-  command->add_option("--at", options.how.at, "one frame alone, its first sample, from 0")
+                           "spectrum");
+  command->add_option("--at", options.how.at, "analyse one frame only, from this sample on")
       ->check(whole(0.0, 9e15));
   command
       ->add_option("--f0", options.how.f0_hz,
-                   "the fundamental in Hz; without it, that of the loudest stretch, or of the\n"
-                   "lowest mode")
+                   "fundamental (default: estimated, or the lowest mode)")
+      ->type_name("HZ")
       ->check(within(1.0, 384000.0));
   command
       ->add_option("--modes", options.modes,
-                   "tell the T60 of so many modes of a sound, as 'body' finds them")
+                   "print the T60 of the N strongest modes of a sound file")
+      ->type_name("N")
       ->check(whole(1.0, 400.0));
-  command->add_option("-r,--rate", options.rate_hz, "the sample rate of a model or a preset, in Hz")
-      ->check(within(8000.0, 768000.0))
-      ->capture_default_str();
-  command->add_option("--note", options.key, "the key that a preset plays")
+  add_rate(*command, "-r,--rate", options.rate_hz, 8000.0, 768000.0);
+  command->add_option("--note", options.key, "key that a preset plays")
       ->check(whole(0.0, 127.0))
       ->capture_default_str();
-  command->add_option("-s,--seconds", options.seconds, "how long a preset is rendered")
+  command->add_option("-s,--seconds", options.seconds, "length of a preset's note in s")
       ->check(within(0.1, 3600.0))
       ->capture_default_str();
   add_settings(*command, options.settings);
   add_parsed(*command, "--sweep", options.swept, parse_swept,
-             "NAME=LOW:HIGH[:STEPS][:log|:linear], a parameter that goes through a range; of "
-             "several,\nall values with each other");
-  command->add_option("--figures", options.figures, "those that the picture of a sweep shows")
+             "parameter to sweep: NAME=LOW:HIGH[:STEPS][:log|:linear]");
+  command->add_option("--figures", options.figures, "figures in the .svg of a sweep")
+      ->type_name("NAME,...")
       ->delimiter(',')
       ->allow_extra_args(false);
   add_parsed(*command, "--law", options.laws, parse_law,
-             "FIGURE=FORMULA of what is swept, drawn beside what is found");
+             "formula to plot beside a figure: FIGURE=FORMULA");
   add_motion(*command, options.third);
   command->callback([&options, &code] { code = describe_command(options); });
 }

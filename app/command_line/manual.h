@@ -1,4 +1,4 @@
-// app/command_line: what an installed program has beside it, printed from its own tables.
+// app/command_line: the manual page and the completion for bash, generated from the options.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -7,13 +7,13 @@
 
 namespace ressort::command_line {
 
-// The manual page ressort(1), for man; of all commands of `app`, of the console and of OSC.
+// Prints the manual page ressort(1): the --help of every command.
 int print_man(const CLI::App& app);
 
-// What bash completes after "ressort": commands, options, their words, presets, models and files.
+// Prints a completion for bash: commands, options, presets, models and files.
 int print_completion(const CLI::App& app);
 
-// Every preset and model by its name, a line each.
+// Prints the names of all presets and models, one per line.
 int print_names();
 
 }  // namespace ressort::command_line

@@ -17,8 +17,24 @@ CLI::Validator within(double least, double most) {
           range};
 }
 
+CLI::Option* add_model(CLI::App& command, std::string& name, const std::string& help) {
+  return command.add_option("MODEL", name, help)->type_name("NAME");
+}
+
+CLI::Option* add_output(CLI::App& command, std::string& path, const std::string& help) {
+  return command.add_option("-o,--output", path, help)->type_name("FILE");
+}
+
+void add_rate(CLI::App& command, const std::string& name, double& rate_hz, double least,
+              double most) {
+  command.add_option(name, rate_hz, "sample rate")
+      ->type_name("HZ")
+      ->check(within(least, most))
+      ->capture_default_str();
+}
+
 void add_overwrite(CLI::App& command, bool& force) {
-  command.add_flag("--force", force, "write over a file that is there");
+  command.add_flag("--force", force, "overwrite existing files");
 }
 
 Result<Setting> parse_setting(const std::string& text) {
@@ -30,7 +46,8 @@ Result<Setting> parse_setting(const std::string& text) {
 }
 
 void add_settings(CLI::App& command, std::vector<Setting>& settings) {
-  add_parsed(command, "--set", settings, parse_setting, "NAME=VALUE, a parameter from the start");
+  add_parsed(command, "--set", settings, parse_setting, "initial value of a parameter")
+      ->type_name("NAME=VALUE");
 }
 
 void add_motion(CLI::App& command, std::optional<ThirdArgument>& third) {
@@ -41,26 +58,26 @@ void add_motion(CLI::App& command, std::optional<ThirdArgument>& third) {
             third = word == "velocity" ? ThirdArgument::velocity_per_second
                                        : ThirdArgument::delayed_position;
           },
-          "what the last argument of a mass means: velocity, in units per second, or delayed, the\n"
-          "position one sample before; without it, what the preset or the model says or shows")
-      ->check(CLI::IsMember({"velocity", "delayed"}))
+          "last argument of a mass: velocity (per second) or delayed position")
+      ->check(CLI::IsMember({"velocity", "delayed"}).description(""))
       ->type_name("WORD");
 }
 
 void add_method(CLI::App& command, std::optional<Method>& method) {
   std::vector<std::string> words = {"auto"};
+  std::string all = "auto";
   for (const auto use : {KernelRow::Use::published, KernelRow::Use::physical}) {
     for (const Method known : methods_for(use)) {
       words.emplace_back(method_name(known));
+      all += ", " + words.back();
     }
   }
   command
       .add_option_function<std::string>(
           "--method", [&method](const std::string& word) { method = method_called(word); },
-          "how each part is computed, where it can be: auto takes what is fastest, but for a\n"
-          "bare model direct, which is the published scheme bit for bit on every machine")
+          "method of computation: " + all)
       ->check([](const std::string& word) { return removed_method_advice(word); })
-      ->check(CLI::IsMember(words))
+      ->check(CLI::IsMember(words).description(""))
       ->type_name("WORD");
 }
 
@@ -75,46 +92,40 @@ void add_budget(CLI::App& command, std::optional<Budget>& budget) {
             }
             budget = *parsed;
           },
-          "how far the sound may be from the continuous network, and what may be left out:\n"
-          "'cents=3 t60=5 silence=-60 passive=auto'; cents of pitch, % of decay, dB below the\n"
-          "peak of the unreduced output over its whole life, and whether contacts may not gain\n"
-          "energy: auto, always, never. Without it what the preset says, else the published\n"
-          "scheme for all that is linear. Cents and % that cannot be kept are told, with how far\n"
-          "off it is")
+          "accuracy, such as 'cents=3 t60=5 silence=-60 passive=auto' (default: the preset's)")
       ->type_name("TEXT");
 }
 
 void add_strict(CLI::App& command, bool& is_strict) {
-  command.add_flag(
-      "--strict", is_strict,
-      "a budget of cents or t60 that is not kept, or of which nobody knows whether it\n"
-      "is, and a bow that is too strong for its steps are errors: exit code 2 instead of\n"
-      "a warning");
+  command.add_flag("--strict", is_strict, "fail (exit code 2) if the budget may be missed");
+}
+
+void add_no_rescale(CLI::App& command, bool& rescale) {
+  command.add_flag_callback(
+      "--no-rescale", [&rescale] { rescale = false; },
+      "do not convert the model's numbers from 44100 Hz to other rates");
 }
 
 void add_numbers(CLI::App& command, Precision& precision, bool& rescale) {
   add_choice<Precision>(command, "--precision", precision,
                         {{"double", Precision::float64}, {"float", Precision::float32}},
-                        "of the computation");
-  command.add_flag_callback(
-      "--no-rescale", [&rescale] { rescale = false; },
-      "take the model's numbers raw at rates other than 44100 Hz");
+                        "floating-point format");
+  add_no_rescale(command, rescale);
 }
 
 void add_keys(CLI::App& command, KeyOptions& keys) {
-  command.add_option("--tuning", keys.scale, "a Scala file, NAME.scl: the steps between keys");
-  command.add_option("--keyboard-map", keys.keyboard_map,
-                     "a Scala keyboard map, NAME.kbm: which key plays which step, at what pitch");
+  command.add_option("--tuning", keys.scale, "Scala scale, NAME.scl")->type_name("FILE");
+  command.add_option("--keyboard-map", keys.keyboard_map, "Scala keyboard map, NAME.kbm")
+      ->type_name("FILE");
   command
       .add_option_function<double>(
-          "--a4", [&keys](const double& hz) { keys.a4_hz = hz; },
-          "the pitch of the A above the middle C, to which all is tuned (440)")
+          "--a4", [&keys](const double& hz) { keys.a4_hz = hz; }, "pitch of A4 (default 440)")
+      ->type_name("HZ")
       ->check(within(220.0, 880.0));
 }
 
 void add_force(CLI::App& command, bool& force) {
-  command.add_flag("--force", force,
-                   "play a model that is not stable all the same; what runs away fades out");
+  command.add_flag("--force", force, "play unstable models; diverging voices fade out");
 }
 
 }  // namespace ressort::command_line

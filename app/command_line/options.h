@@ -1,4 +1,4 @@
-// app/command_line: options that several commands have.
+// app/command_line: options that several commands share.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -15,17 +15,23 @@
 
 namespace ressort::command_line {
 
-// A number within a range; what is no number is in none.
+// Accepts numbers within a range; rejects NaN and words.
 CLI::Validator within(double least, double most);
 
-// Whether a file that is there is written over.
+// The preset or model to load.
+CLI::Option* add_model(CLI::App& command, std::string& name, const std::string& help);
+CLI::Option* add_output(CLI::App& command, std::string& path, const std::string& help);
+void add_rate(CLI::App& command, const std::string& name, double& rate_hz, double least,
+              double most);
+
+// Permission to replace existing files.
 void add_overwrite(CLI::App& command, bool& force);
 
-// "NAME=VALUE", what a parameter is from the start.
+// Parses "NAME=VALUE", the initial value of a parameter.
 Result<Setting> parse_setting(const std::string& text);
 void add_settings(CLI::App& command, std::vector<Setting>& settings);
 
-// What the last argument of a mass means, for every command that reads a model.
+// The meaning of the last argument of a mass.
 void add_motion(CLI::App& command, std::optional<ThirdArgument>& third);
 
 void add_method(CLI::App& command, std::optional<Method>& method);
@@ -33,13 +39,14 @@ void add_budget(CLI::App& command, std::optional<Budget>& budget);
 void add_strict(CLI::App& command, bool& is_strict);
 void add_force(CLI::App& command, bool& force);
 
-// How the network is computed, for every command that computes it.
+void add_no_rescale(CLI::App& command, bool& rescale);
+// Precision and rescaling.
 void add_numbers(CLI::App& command, Precision& precision, bool& rescale);
 
-// What is said of keys, instead of what the preset says.
+// Tuning, which overrides the preset.
 void add_keys(CLI::App& command, KeyOptions& keys);
 
-// One of a few words.
+// An option that takes one of a few words. The first is the default.
 template <class T>
 CLI::Option* add_choice(CLI::App& command, const std::string& name, T& target,
                         const std::vector<std::pair<std::string, T>>& choices,
@@ -60,15 +67,15 @@ CLI::Option* add_choice(CLI::App& command, const std::string& name, T& target,
             }
             throw CLI::ValidationError(name, "must be one of " + words + ", found " + text);
           },
-          help + ": " + words + " (" + choices.front().first + ")")
+          help + ": " + words + " (default " + choices.front().first + ")")
       ->type_name("WORD");
 }
 
-// Texts that one function reads, one for each time that the option stands.
+// An option that may be repeated; `parse` reads each value.
 template <class T>
-void add_parsed(CLI::App& command, const std::string& name, std::vector<T>& target,
-                Result<T> (*parse)(const std::string&), const std::string& help) {
-  command
+CLI::Option* add_parsed(CLI::App& command, const std::string& name, std::vector<T>& target,
+                        Result<T> (*parse)(const std::string&), const std::string& help) {
+  return command
       .add_option_function<std::vector<std::string>>(
           name,
           [&target, parse, name](const std::vector<std::string>& texts) {

@@ -11,35 +11,32 @@ namespace {
 
 const char* const play_examples =
     "Examples:\n"
-    "  ressort play                              the triangle, on JACK, else ALSA, else silent\n"
-    "  ressort play PolyTriangle -j              connected to the speakers and every keyboard\n"
-    "  ressort play Resonator --midi song.mid    or, by the triangle: ressort play song.mid\n"
-    "  ressort play my.mdl -a alsa -d hw:1       a model of your own on one sound card\n"
-    "  ressort play -B 0.0.0.0 --osc-allow 192.168.1.23   played by OSC from a tablet, say\n"
-    "  ressort play Gong --web 9788              seen and played in a browser, at the address it "
-    "prints\n"
-    "  oscsend localhost 9777 /note/on ii 69 100 a note by OSC, from another terminal\n";
+    "  ressort play                             the triangle, on JACK, ALSA or silently\n"
+    "  ressort play PolyTriangle -j             connected to the speakers and all keyboards\n"
+    "  ressort play Resonator --midi song.mid   a MIDI file; with the triangle: ressort play "
+    "song.mid\n"
+    "  ressort play my.mdl -a alsa -d hw:1      a model of your own on one sound card\n"
+    "  ressort play -B 0.0.0.0 --osc-allow 192.168.1.23   OSC from a tablet\n"
+    "  ressort play Gong --web 9788             in a browser, at the address that it prints\n"
+    "  oscsend localhost 9777 /note/on ii 69 100   a note by OSC, from another terminal\n";
 
 }  // namespace
 
 void add_play(CLI::App& app, PlayOptions& options, int& code) {
-  CLI::App* command = app.add_subcommand("play", "plays a model or a preset");
+  CLI::App* command = app.add_subcommand("play", "plays a preset or a model live");
   command->footer(play_examples);
-  command
-      ->add_option(
-          "MODEL", options.name,
-          "a preset's or a model's name, or a file; or a .mid file, or a .ressort flight,\n"
-          "which is played")
+  add_model(*command, options.name, "preset or model, by name or file; a .mid or .ressort file")
       ->capture_default_str();
-  command->add_option("-a,--audio", options.audio, "where the sound goes")
-      ->check(CLI::IsMember({"auto", "jack", "alsa", "dummy"}))
+  command->add_option("-a,--audio", options.audio, "audio backend: auto, jack, alsa or dummy")
+      ->type_name("WORD")
+      ->check(CLI::IsMember({"auto", "jack", "alsa", "dummy"}).description(""))
       ->capture_default_str();
-  command->add_option("-d,--device", options.device.device, "the ALSA device")
+  command->add_option("-d,--device", options.device.device, "ALSA device")
+      ->type_name("NAME")
       ->capture_default_str();
   command
       ->add_option("-m,--midi", options.midi,
-                   "where keyboards come from: auto, jack, alsa or none; or a .mid file, which is\n"
-                   "played beside them. With -i the program ends when that has fallen silent")
+                   "MIDI backend: auto, jack, alsa or none; or a .mid file to play")
       ->check(CLI::Validator(
           [](std::string& word) {
             const bool is_known =
@@ -48,27 +45,27 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
                        ? std::string()
                        : "must be auto, jack, alsa, none or a .mid file, found " + word;
           },
-          "WORD"))
+          ""))
+      ->type_name("WORD")
       ->capture_default_str();
   command->add_flag("-j,--connect", options.device.connect,
-                    "connect to the speakers and to every keyboard (JACK)");
-  command->add_option("-n,--name", options.device.client_name, "the name of our JACK client")
+                    "connect to the speakers and to all keyboards (JACK)");
+  command->add_option("-n,--name", options.device.client_name, "JACK client name")
       ->check(CLI::Validator(
           [](std::string& name) {
             return name.empty() || name.size() > 60 || name.find(':') != std::string::npos
-                       ? std::string("must have 1 to 60 characters, and no ':' among them")
+                       ? std::string("must have 1 to 60 characters and no ':'")
                        : std::string();
           },
-          "NAME"))
+          ""))
+      ->type_name("NAME")
       ->capture_default_str();
-  command->add_option("-g,--gain", options.gain_db, "dB on top of the preset's gain")
+  command->add_option("-g,--gain", options.gain_db, "gain in addition to the preset's")
+      ->type_name("DB")
       ->check(within(-120.0, 60.0));
-  command->add_option("-p,--voices", options.voices, "how many notes sound at once")
+  command->add_option("-p,--voices", options.voices, "number of voices (default: the preset's)")
       ->check(within(1, max_voices));
-  command
-      ->add_option("--threads", options.threads,
-                   "for voices and large networks: others help the audio thread, which never\n"
-                   "waits for them")
+  command->add_option("--threads", options.threads, "threads for voices and large networks")
       ->check(within(1, 64))
       ->capture_default_str();
   command
@@ -84,12 +81,11 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
             if (!is_share || number != std::floor(number) || of != std::floor(of) || number < 1.0 ||
                 number > of || of > NoteShare::most_parts) {
               throw CLI::ValidationError(
-                  "--share", "must be 1/2, the first of two, up to 64/64; found '" + text + "'");
+                  "--share", "must be N/OF, such as 1/2, at most 64/64; found '" + text + "'");
             }
             options.share = {static_cast<int>(number), static_cast<int>(of)};
           },
-          "which of the notes, of several programs that hear the same: 1/2 and 2/2 take keys\n"
-          "in turn, on two cores. All are started before the first note")
+          "play every OF-th note only; start one program for each N")
       ->type_name("N/OF");
   add_keys(*command, options.keys);
   command
@@ -102,13 +98,17 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
             }
             options.keys.channels = mask;
           },
-          "the MIDI channels to listen to, separated by commas, whatever the preset says")
+          "MIDI channels to receive (default: the preset's)")
+      ->type_name("N,...")
       ->delimiter(',')
       ->check(within(1, 16));
-  command->add_option("-r,--rate", options.device.rate_hz, "Hz; JACK has its own")
+  command->add_option("-r,--rate", options.device.rate_hz, "sample rate, unless JACK sets it")
+      ->type_name("HZ")
       ->check(within(8000.0, 384000.0))
       ->capture_default_str();
-  command->add_option("-z,--period", options.device.period_frames, "frames; JACK has its own")
+  command
+      ->add_option("-z,--period", options.device.period_frames,
+                   "period in frames, unless JACK sets it")
       ->check(within(16, 8192))
       ->capture_default_str();
   add_numbers(*command, options.precision, options.rescale);
@@ -116,39 +116,44 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
   add_budget(*command, options.budget);
   add_motion(*command, options.third);
   add_force(*command, options.force);
-  command->add_flag("-i,--no-console", options.no_console, "do not read commands");
-  command->add_option("-e,--execute", options.script, "a file of console commands, run first");
-  command->add_option_function<std::string>(
-      "-u,--osc-port",
-      [&options](const std::string& text) {
-        double port = 0.0;
-        if (text != "off" && (!parse_number(text, port) || port < 1.0 || port > 65535.0)) {
-          throw CLI::ValidationError("--osc-port", "must be 1 to 65535, or off");
-        }
-        options.osc.port = static_cast<int>(port);
-      },
-      "the UDP port for OSC, or off (9777)");
-  command->add_option("-B,--osc-bind", options.osc.bind_address, "the address that OSC listens at")
+  command->add_flag("-i,--no-console", options.no_console, "do not read console commands");
+  command->add_option("-e,--execute", options.script, "file of console commands to run first")
+      ->type_name("FILE");
+  command
+      ->add_option_function<std::string>(
+          "-u,--osc-port",
+          [&options](const std::string& text) {
+            double port = 0.0;
+            if (text != "off" && (!parse_number(text, port) || port < 1.0 || port > 65535.0)) {
+              throw CLI::ValidationError("--osc-port", "must be 1 to 65535, or off");
+            }
+            options.osc.port = static_cast<int>(port);
+          },
+          "OSC port, or off (default 9777)")
+      ->type_name("PORT");
+  command->add_option("-B,--osc-bind", options.osc.bind_address, "address for OSC to listen at")
+      ->type_name("ADDRESS")
       ->capture_default_str();
-  command->add_option("--osc-allow", options.osc.allow,
-                      "who may send OSC from elsewhere: addresses or networks, divided by commas,\n"
-                      "192.168.1.23,10.0.0.0/24; needed with any -B but this machine's");
+  command
+      ->add_option("--osc-allow", options.osc.allow,
+                   "senders of OSC to accept: 192.168.1.23,10.0.0.0/24; required with -B")
+      ->type_name("ADDRESS,...");
   command
       ->add_option("--web", options.panel.port,
-                   "show and play it in a browser: the port of its page, " +
-                       std::to_string(WebPanel::usual_port) + " without a number")
+                   "port of the web page that shows and plays the model")
+      ->type_name("PORT")
       ->expected(0, 1)
       ->default_str(std::to_string(WebPanel::usual_port))
       ->check(within(1, 65535));
   command
       ->add_option("--web-bind", options.panel.bind_address,
-                   "the address that the page is at; beyond this machine only with its token")
+                   "address of the web page; other machines need its token")
+      ->type_name("ADDRESS")
       ->capture_default_str();
   command->add_flag("--exit-on-loss", options.exit_on_loss,
-                    "end with 75 when the audio server dies, instead of waiting for it");
+                    "exit with 75 when the audio server ends, instead of waiting");
   command->add_flag("--watch", options.watch,
-                    "read the model and the preset again when their files change; numbers go to\n"
-                    "the voices that sound");
+                    "reload the model and the preset when their files change");
   command->callback([&options, &code] { code = play(options); });
 }
 

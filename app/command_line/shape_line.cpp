@@ -11,13 +11,13 @@ namespace ressort::command_line {
 namespace {
 
 const char* const shape_examples =
-    "Parameters move within their ranges; the pitch stays where keys have it. Figures are those "
-    "of\n"
-    "'describe', in the first 2048 samples of a blow, the preset's own at velocity 100 if it has "
-    "one,\nof the mean of all outputs; T60 is that of the pitch, the attack that of the whole "
-    "sound.\n"
-    "How far each is off is told in just noticeable differences (JND), and where it cannot be\n"
-    "reached, what holds it.\n"
+    "Changes the parameters within their ranges. The pitch of presets stays. Figures are those of\n"
+    "'describe', in the first 2048 samples of a strike (the preset's own at velocity 100, if it "
+    "has one),\n"
+    "of the mean of all outputs. T60 is that of the pitch; the attack is that of the whole sound. "
+    "Prints\n"
+    "the remaining deviations in just noticeable differences (JND), and what prevents an exact "
+    "match.\n"
     "Examples:\n"
     "  ressort shape PolyTriangle --centroid 400 --t60 3 -o darker.toml\n"
     "  ressort shape my.mdl --f0 220 --inharmonicity 0.02 -o stiff.toml\n"
@@ -26,27 +26,27 @@ const char* const shape_examples =
 const char* help_of(AskedFigure figure) {
   switch (figure) {
     case AskedFigure::f0:
-      return "the lowest mode that is heard, in Hz, where no key sets the pitch";
+      return "lowest audible mode in Hz, of models without keys";
     case AskedFigure::t60:
-      return "short or long: the T60 of the pitch in s";
+      return "T60 of the pitch in s: short or long";
     case AskedFigure::centroid:
-      return "dark or bright: the centroid of the spectrum in Hz";
+      return "spectral centroid in Hz: dark or bright";
     case AskedFigure::spread:
-      return "narrow or wide: the spread of the spectrum in Hz";
+      return "spectral spread in Hz: narrow or wide";
     case AskedFigure::inharmonicity:
-      return "harmonic or bell-like: the inharmonicity";
+      return "inharmonicity: harmonic or bell-like";
     case AskedFigure::odd_to_even:
-      return "full or hollow: the energy of odd partials over that of even ones";
+      return "energy ratio of odd to even partials: full or hollow";
     case AskedFigure::rolloff:
-      return "below what frequency 95 % of the energy is, in Hz";
+      return "frequency below which 95 % of the energy is, in Hz";
     case AskedFigure::skewness:
-      return "how much the spectrum leans upwards";
+      return "spectral skewness";
     case AskedFigure::kurtosis:
-      return "flat or peaked: the kurtosis of the spectrum, 3 of a bell curve";
+      return "spectral kurtosis: flat or peaked; 3 for a normal curve";
     case AskedFigure::slope:
-      return "of the line through the spectrum, in 1/Hz";
+      return "slope of the regression line of the spectrum, in 1/Hz";
     case AskedFigure::attack:
-      return "sudden or slow: the attack in ms, 10 to the log attack time";
+      return "attack time in ms: sudden or slow";
   }
   return "";
 }
@@ -54,13 +54,13 @@ const char* help_of(AskedFigure figure) {
 }  // namespace
 
 void add_shape(CLI::App& app, ShapeOptions& options, int& code) {
-  CLI::App* command = app.add_subcommand(
-      "shape", "turns a linear model to a timbre that is asked for: darker, hollower, longer");
+  CLI::App* command =
+      app.add_subcommand("shape", "adjusts a linear model's parameters to reach a target timbre");
   command->footer(shape_examples);
-  command->add_option("MODEL", options.name, "a preset's or a model's name or file")->required();
-  command->add_option("-o,--output", options.output, "the preset that comes of it, a .toml");
+  add_model(*command, options.name, "preset or model, by name or file")->required();
+  add_output(*command, options.output, "preset to write, a .toml file");
   add_overwrite(*command, options.force);
-  command->add_flag("--json", options.as_json, "for machines");
+  command->add_flag("--json", options.as_json, "print JSON");
   for (const AskedFigureRow& row : asked_figure_rows()) {
     std::string name = "--" + short_name(row.figure);
     std::replace(name.begin(), name.end(), '_', '-');
@@ -79,13 +79,14 @@ void add_shape(CLI::App& app, ShapeOptions& options, int& code) {
             help_of(row.figure))
         ->type_name("NUMBER");
   }
-  command->add_option("--like", options.like,
-                      "all of these as a sound file has them in its loudest frame");
-  command->add_option("--note", options.key, "the key of a preset (57, or the sound file's)")
+  command->add_option("--like", options.like, "sound file whose loudest frame gives all targets")
+      ->type_name("FILE");
+  command->add_option("--note", options.key, "key of a preset (default: 57, or the sound file's)")
       ->check(within(0.0, 127.0));
   command
       ->add_option("-r,--rate", options.rate_hz,
-                   "the sample rate in Hz (44100, or the sound file's)")
+                   "sample rate (default: 44100, or the sound file's)")
+      ->type_name("HZ")
       ->check(within(8000.0, 768000.0));
   add_motion(*command, options.third);
   command->allow_extras();
@@ -97,8 +98,8 @@ void add_shape(CLI::App& app, ShapeOptions& options, int& code) {
       }
     }
     if (!command->remaining().empty()) {
-      throw CLI::ValidationError("shape", "one model alone can be shaped, found '" +
-                                              command->remaining().front() + "' as well");
+      throw CLI::ValidationError(
+          "shape", "expected one model, found '" + command->remaining().front() + "' as well");
     }
     code = shape_command(options);
   });

@@ -48,12 +48,12 @@ json findings_json(const std::vector<Finding>& findings) {
   return out;
 }
 
-// What is proved of a scene.
+// Results of the stability analysis of a scene.
 struct Proved {
-  Certificate certificate;  // everywhere in the preset's ranges, or at the model's own values
+  Certificate certificate;  // in all of the preset's ranges, or at the model's own values
   double stiffness_factor = 0.0;
-  bool is_exact = true;     // else by a bound
-  bool others_move = true;  // the limits below hold wherever the others are turned to
+  bool is_exact = true;     // false: by a bound
+  bool others_move = true;  // the limits hold for all values of the other parameters
   std::vector<std::optional<SafeRange>> safe;  // [parameter]
 };
 
@@ -66,12 +66,12 @@ Proved prove(const Scene& scene, const Compiled& compiled, const Progress& progr
     as_written.highest.push_back(info.value);
   }
   Stability stability(compiled.stability.proved, 1.0, Stability::most_exact_masses, progress);
-  progress.stage("proving that it is stable in all ranges");
+  progress.stage("checking the stability in all ranges");
   Proved proved{.certificate = stability.certify(box),
                 .stiffness_factor = stability.stiffness_factor(box)};
   proved.others_move = proved.certificate.verdict == Verdict::stable;
   proved.is_exact = stability.is_exact();
-  progress.stage("finding the limits of its parameters");
+  progress.stage("finding the limits of the parameters");
   for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
     proved.safe.push_back(stability.safe_range(proved.others_move ? box : as_written, i,
                                                instrument.parameters[i].value));
@@ -108,7 +108,7 @@ json parameter_json(const ParameterInfo& info, int input, const std::optional<Sa
   } else {
     out.update({{"value", info.value}, {"minimum", info.minimum}, {"maximum", info.maximum}});
   }
-  // A limit that there is not is null; what is stable nowhere has no limits.
+  // Missing limits are null. A parameter that is stable nowhere has no limits.
   if (safe) {
     out["stable_above"] = limit_json(safe->lowest);
     out["stable_below"] = limit_json(safe->highest);
@@ -131,7 +131,7 @@ json stability_json(const Proved& proved) {
   return out;
 }
 
-// How far off it is told to be, with what there is no number for as null.
+// Deviations as JSON; null where a number is unknown.
 json accuracy_json(const Accuracy& accuracy) {
   const auto figure = [&](double value) { return accuracy.is_known ? limit_json(value) : json(); };
   return {{"cents", figure(accuracy.cents)},
@@ -139,7 +139,7 @@ json accuracy_json(const Accuracy& accuracy) {
           {"is_bound", accuracy.is_bound}};
 }
 
-// Of a budget for pitch or decay; whether it is kept is null where that is not known.
+// A budget of pitch or decay as JSON; "kept" is null where it is unknown.
 json budget_json(const Plan& plan) {
   json out = accuracy_json(*plan.accuracy);
   out["asked"] = print_budget(plan.budget);
@@ -189,7 +189,7 @@ json scene_json(const Scene& scene, const Compiled& compiled, const Proved& prov
   return out;
 }
 
-// Names the element that makes the scene unstable, at its line of the model.
+// Reports the element that makes the scene unstable, at its line of the model.
 void warn(const Proved& proved, const Scene& scene, std::vector<Finding>& findings) {
   if (!proved.certificate.culprit) {
     return;
@@ -199,7 +199,7 @@ void warn(const Proved& proved, const Scene& scene, std::vector<Finding>& findin
   findings.push_back(std::move(finding));
 }
 
-// That there is not enough time for all of its voices.
+// Warns if the CPU is too slow for all voices.
 void warn(const Scene& scene, const Compiled& compiled, std::vector<Finding>& findings) {
   const CompileOptions options;
   const std::string text =
@@ -212,11 +212,10 @@ void warn(const Scene& scene, const Compiled& compiled, std::vector<Finding>& fi
 }
 
 std::string by_bound(const Proved& proved) {
-  return proved.is_exact ? ""
-                         : "; so large a network is judged by a bound, which may be too careful";
+  return proved.is_exact ? "" : "; for a network of this size only a conservative bound is checked";
 }
 
-// The report's last line.
+// Returns the last line of the report.
 std::string conclusion(const Scene& scene, const Proved& proved) {
   const bool has_ranges = !scene.preset.parameters.empty();
   switch (proved.certificate.verdict) {
@@ -224,21 +223,22 @@ std::string conclusion(const Scene& scene, const Proved& proved) {
       break;
     case Verdict::unstable:
       return has_ranges
-                 ? "not stable everywhere in the parameters' ranges; the limits above are "
-                   "for one of them while the others stay where they start"
-                 : "not stable; the limits above are for one parameter while the others stay";
+                 ? "not stable in all ranges of the parameters; the limits above hold for one "
+                   "parameter while the others keep their initial values"
+                 : "not stable; the limits above hold for one parameter while the others stay";
     case Verdict::unproved:
       return "not proved stable" + by_bound(proved);
   }
-  std::string text = has_ranges ? "stable, wherever the parameters are turned to" : "stable";
+  std::string text = has_ranges ? "stable in all ranges of the parameters" : "stable";
   const auto& parameters = scene.network.parameters;
   if (std::any_of(parameters.begin(), parameters.end(),
                   [](const Parameter& parameter) { return parameter.audio_input > 0; })) {
-    text += has_ranges ? "" : " as it starts";
-    text += ", as long as the inputs keep to the limits above";
+    text += has_ranges ? "" : " at the initial values";
+    text += ", while the inputs stay within the limits above";
   }
   if (std::isfinite(proved.stiffness_factor)) {
-    text += ": every stiffness may grow " + print_limit(proved.stiffness_factor, true) + " times";
+    text += "; every stiffness may be multiplied by up to " +
+            print_limit(proved.stiffness_factor, true);
   }
   return text + by_bound(proved);
 }
@@ -255,20 +255,20 @@ void print_report(const Scene& scene, const Compiled& compiled, const Proved& pr
     const ParameterInfo& info = instrument.parameters[i];
     const std::string safe = describe(proved.safe[i]);
     if (const int input = scene.network.parameters[i].audio_input; input > 0) {
-      std::printf("  %-12s is input %d, sample by sample, from %g to %g; %s\n", info.name.c_str(),
-                  input, info.minimum, info.maximum, safe.c_str());
+      std::printf("  %-12s audio input %d, from %g to %g; %s\n", info.name.c_str(), input,
+                  info.minimum, info.maximum, safe.c_str());
     } else {
       std::printf("  %-12s %-10g from %g to %g; %s\n", info.name.c_str(), info.value, info.minimum,
                   info.maximum, safe.c_str());
     }
   }
-  std::printf("runs as\n  %s", describe(compiled.plan).c_str());
+  std::printf("methods:\n  %s", describe(compiled.plan).c_str());
   if (instrument.mode) {
     const int number = scene.preset.pitch_mode;
     const bool is_lowest = number == 1 || has_waveguide(scene.network);
     const std::string mode = is_lowest ? "lowest mode" : "mode " + std::to_string(number);
-    std::printf("%s %.3f Hz; keys are in tune up to %.0f Hz, higher ones are silent\n",
-                mode.c_str(), instrument.mode->frequency_hz, instrument.highest_frequency_hz);
+    std::printf("%s %.3f Hz; keys sound up to %.0f Hz, higher keys are silent\n", mode.c_str(),
+                instrument.mode->frequency_hz, instrument.highest_frequency_hz);
   }
   std::printf("%s\n", conclusion(scene, proved).c_str());
 }
@@ -280,7 +280,7 @@ int check(const CheckOptions& options) {
                 [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
   const Progress progress([&](std::string_view stage) {
     news.at(stage);
-    return true;  // Ctrl-C ends it at once
+    return true;  // Ctrl-C ends the process
   });
   Reading reading = read_scene(options.name, {.third = options.third, .progress = progress});
   Admission admission;
@@ -309,7 +309,7 @@ int check(const CheckOptions& options) {
     json out = compiled ? scene_json(*reading.scene, *compiled, *proved) : json::object();
     out["ok"] = is_ok;
     out["findings"] = findings_json(reading.findings);
-    // Names may be in any encoding; what is no UTF-8 is replaced.
+    // Names may have any encoding; invalid UTF-8 is replaced.
     std::printf("%s\n", out.dump(2, ' ', false, json::error_handler_t::replace).c_str());
   } else {
     tell(reading.findings);
@@ -317,7 +317,7 @@ int check(const CheckOptions& options) {
   if (!compiled) {
     return exit_code::wrong_use;
   }
-  // What may not sound is shown all the same: whoever mends it wants to see it.
+  // Also reports on models that may not be played, to help to repair them.
   if (options.as == CheckAs::report) {
     print_report(*reading.scene, *compiled, *proved);
   } else if (options.as == CheckAs::model) {

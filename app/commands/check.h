@@ -1,4 +1,4 @@
-// app/commands: says what is in a model or a preset. The exit code comes back.
+// app/commands: checks a model or a preset and prints a report.
 #pragma once
 
 #include <optional>
@@ -14,15 +14,15 @@ enum class CheckAs { report, json, model };
 
 struct CheckOptions {
   std::string name;
-  CheckAs as = CheckAs::report;        // model: the text in one clean dialect
-  std::optional<ThirdArgument> third;  // whatever preset and model say
-  std::optional<Method> method;        // without one, the plan's choice
-  std::optional<Budget> budget;        // instead of the preset's
-  bool is_strict = false;              // what only warns is an error
+  CheckAs as = CheckAs::report;        // model: the text in the current notation
+  std::optional<ThirdArgument> third;  // empty: as the preset or the model says
+  std::optional<Method> method;        // empty: the plan's choice
+  std::optional<Budget> budget;        // empty: the preset's
+  bool is_strict = false;              // treats warnings about the budget as errors
 };
 
-// Findings go to stderr, with their lines if that is a terminal; with json all is one object on
-// stdout.
+// Prints findings to stderr, with their source lines if it is a terminal. JSON is one object on
+// stdout instead. Returns the exit code.
 int check(const CheckOptions& options);
 
 }  // namespace ressort::commands

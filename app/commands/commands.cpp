@@ -28,7 +28,7 @@ std::string db(double factor) {
   return text;
 }
 
-// From now on a signal ends the render where it is, and a second one the program.
+// Lets a signal stop the render, and a second signal the program.
 void watch_signals() {
   struct sigaction once {};
   once.sa_handler = [](int) { interrupted.raise(); };
@@ -61,7 +61,7 @@ int render_command(const RenderOptions& options, bool is_quiet) {
   LoadNews news(options.name, is_quiet ? LoadNews::Tell() : complain);
   watched.loading = Progress([&](std::string_view stage) {
     news.at(stage);
-    return true;  // a signal ends it at once
+    return true;  // a signal ends the process
   });
   bool is_watched = false;
   const auto make = names_flight(options.name) ? render_flight : render;
@@ -95,12 +95,12 @@ int render_command(const RenderOptions& options, bool is_quiet) {
                 rendered->rate_hz, db(rendered->peak).c_str(), db(rendered->rms).c_str(),
                 rendered->was_interrupted ? ", interrupted" : "");
     if (rendered->peak > 1.0) {
-      complain("the peak passes full scale; --limit keeps it below");
+      complain("the peak exceeds full scale; pass --limit to avoid clipping");
     }
     const bool was_asked = names_flight(options.name) || !options.score.empty() ||
                            !options.input.empty() || !options.midi.empty();
     if (rendered->peak == 0.0 && rendered->frames > 0 && !was_asked) {
-      complain("nothing excites the model: give it a --score or an --input");
+      complain("the output is silent: nothing excites the model; pass --score or --input");
     }
   }
   if (rendered->resets > 0) {
@@ -108,7 +108,7 @@ int render_command(const RenderOptions& options, bool is_quiet) {
     complain(rendered->name + (is_once ? ": a voice" : ": voices") +
              " became unstable and faded out" +
              (is_once ? "" : " " + std::to_string(rendered->resets) + " times") +
-             "; the sound is not to be trusted");
+             "; the output is not valid");
   }
   return rendered->was_interrupted ? exit_code::our_failure : exit_code::done;
 }

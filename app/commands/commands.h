@@ -1,5 +1,4 @@
-// app/commands: what the program does, one function for each of its commands. The exit code comes
-// back.
+// app/commands: one function per command of the program. Each returns the exit code.
 #pragma once
 
 #include <optional>
@@ -19,32 +18,32 @@
 namespace ressort::commands {
 
 struct PlayOptions {
-  std::string name = "IPlayTheTriangle";  // or a MIDI file, which this one plays
+  std::string name = "IPlayTheTriangle";  // or a MIDI file, played by this preset
   std::string audio = "auto";             // jack, alsa, dummy, auto
-  std::string midi = "auto";              // auto, alsa, jack, none, or a MIDI file, and then auto
+  std::string midi = "auto";              // auto, alsa, jack, none, or a MIDI file
   AudioOptions device;
   double gain_db = 0.0;
   int voices = 0;
-  int threads = 1;        // with the audio thread
+  int threads = 1;        // including the audio thread
   NoteShare::Part share;  // of the notes
   Precision precision = Precision::float64;
   bool rescale = true;
-  std::optional<Method> method;        // without one, the plan's choice
-  std::optional<Budget> budget;        // instead of the preset's
-  std::optional<ThirdArgument> third;  // whatever the models show
-  KeyOptions keys;                     // instead of every preset's
-  bool force = false;                  // play the first model even if it is not stable
+  std::optional<Method> method;        // empty: the plan's choice
+  std::optional<Budget> budget;        // empty: the preset's
+  std::optional<ThirdArgument> third;  // empty: as the model shows
+  KeyOptions keys;                     // override every preset's
+  bool force = false;                  // plays the first model even if it is unstable
   bool no_console = false;
   std::string script;
   OscOptions osc;  // port 0: none
   PanelOptions panel;
   bool exit_on_loss = false;
-  bool watch = false;  // what sounds is read again when its files change
+  bool watch = false;  // reloads the scene when its files change
 };
 
 int play(const PlayOptions& options);
 
-// The signals that end the program. nohup's promise is kept.
+// Returns the signals that end the program. SIGHUP is not one of them under nohup.
 std::vector<int> ending_signals();
 int render_command(const RenderOptions& options, bool is_quiet);
 int gallery_command(const GalleryOptions& options);

@@ -12,7 +12,7 @@
 namespace ressort::commands {
 namespace {
 
-// The scene's sliders are what its parameters may be turned to when it is played.
+// The sliders have the ranges of the parameters when they are played.
 Result<std::string> to_faust(const Scene& scene, bool rescale, const Progress& progress) {
   const auto compiled =
       compile_network(scene.network, scene.preset, {.voices = 1, .progress = progress});
@@ -23,7 +23,7 @@ Result<std::string> to_faust(const Scene& scene, bool rescale, const Progress& p
   for (const ParameterInfo& info : compiled->instrument.parameters) {
     sliders.push_back({info.name, info.value, info.minimum, info.maximum, {}});
   }
-  progress.stage("writing it in the other language");
+  progress.stage("generating FAUST code");
   auto text =
       faust_text(scene.network, {.name = scene.name, .sliders = sliders, .rescale = rescale});
   if (!text) {
@@ -36,7 +36,7 @@ Result<std::string> to_faust(const Scene& scene, bool rescale, const Progress& p
 
 int export_to_faust(const ExportOptions& options) {
   if (options.output.ends_with(".mdl") || options.output.ends_with(".toml")) {
-    std::fprintf(stderr, "'%s' is the name of a model or a preset, not of a FAUST program\n",
+    std::fprintf(stderr, "-o: expected a FAUST file such as NAME.dsp, found '%s'\n",
                  options.output.c_str());
     return exit_code::wrong_use;
   }
@@ -44,7 +44,7 @@ int export_to_faust(const ExportOptions& options) {
                 [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
   const Progress progress([&](std::string_view stage) {
     news.at(stage);
-    return true;  // Ctrl-C ends it at once
+    return true;  // Ctrl-C ends the process
   });
   const auto scene = load_scene(options.name, {.third = options.third, .progress = progress});
   if (!scene) {
@@ -66,8 +66,8 @@ int export_to_faust(const ExportOptions& options) {
   }
   if (const std::size_t count = faust_elements(scene->network);
       count > comfortable_faust_elements) {
-    std::fprintf(stderr, "warning: %zu masses and links; beyond %zu FAUST takes minutes\n", count,
-                 comfortable_faust_elements);
+    std::fprintf(stderr, "warning: %zu masses and links; FAUST takes minutes for more than %zu\n",
+                 count, comfortable_faust_elements);
   }
   if (options.output.empty()) {
     std::fputs(text->c_str(), stdout);

@@ -1,4 +1,4 @@
-// app/commands: a model in another program's language.
+// app/commands: exports a model to FAUST.
 #pragma once
 
 #include <optional>
@@ -11,13 +11,13 @@ namespace ressort::commands {
 
 struct ExportOptions {
   std::string name;    // model or preset
-  std::string output;  // a file; empty: to stdout
-  bool force = false;  // write over a file that is there
+  std::string output;  // empty: stdout
+  bool force = false;  // overwrites an existing file
   bool rescale = true;
-  std::optional<ThirdArgument> third;  // whatever preset and model say
+  std::optional<ThirdArgument> third;  // empty: as the preset or the model says
 };
 
-// Writes the model as a FAUST program; the exit code comes back. [main]
+// Writes the model as FAUST code. Returns the exit code. [main]
 int export_to_faust(const ExportOptions& options);
 
 }  // namespace ressort::commands

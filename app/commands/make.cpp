@@ -12,7 +12,7 @@
 namespace ressort::commands {
 namespace {
 
-// It is written all the same: whoever made it may turn its numbers down in the file.
+// Warns about an unstable model but writes it: its numbers can be edited.
 void warn_if_unstable(const Network& network) {
   const std::vector<double> values = parameter_values(network);
   const Certificate found = Stability(network, 1.0).certify({values, values});
@@ -34,8 +34,8 @@ int make(const MakeOptions& options) {
   }
   const std::string text = print_network(*network);
   if (text.size() > max_model_bytes) {
-    return complain("the model would be longer than what is read, " +
-                    std::to_string(max_model_bytes >> 20) + " MiB; a shorter name helps");
+    return complain("the model would exceed the largest size that can be read, " +
+                    std::to_string(max_model_bytes >> 20) + " MiB; use a shorter --name");
   }
   warn_if_unstable(*network);
   if (options.output.empty()) {

@@ -1,4 +1,4 @@
-// app/commands: writes the models that have a regular shape. The exit code comes back.
+// app/commands: generates regular models. Returns the exit code.
 #pragma once
 
 #include <string>
@@ -10,8 +10,8 @@ namespace ressort::commands {
 
 struct MakeOptions {
   Shape shape;
-  std::string output;  // a file; empty for stdout
-  bool force = false;  // write over a file that is there
+  std::string output;  // empty: stdout
+  bool force = false;  // overwrites an existing file
 };
 
 int make(const MakeOptions& options);

@@ -24,12 +24,12 @@ namespace {
 constexpr std::size_t block_frames = 256;
 constexpr std::size_t max_score_bytes = std::size_t{64} << 20;
 constexpr double ring_out_s = 2.0;
-constexpr double longest_ring_s = 60.0;  // after a MIDI file: by then it is silent, or never
+constexpr double longest_ring_s = 60.0;  // longest decay after a MIDI file
 constexpr double silent_for_s = 0.5;
 constexpr double silent_peak = 1e-4;  // -80 dBFS
 constexpr double longest_s = 24.0 * 3600.0;
 
-// A macro's node with all that is known of it until its kernel is made, and how many may be.
+// Bytes per node of a macro until its kernel is built, and the largest number of nodes.
 constexpr std::uint64_t bytes_of_node = 700;  // of a mesh; of a string 500
 constexpr std::uint64_t most_nodes = 1'000'000'000;
 
@@ -44,8 +44,7 @@ Error at(const std::string& path, const Error& error) {
   return {to_string(finding_of(path, "", error))};
 }
 
-// The lines of the score that was asked for, or of the phrase that is played instead; an error has
-// the score's line.
+// Returns the lines of the score, or of the default phrase. Errors have the line of the score.
 Result<std::vector<ScoreLine>> read_score(const RenderOptions& options, bool is_bare) {
   if (options.score.empty()) {
     return parse_score(!options.phrase.empty() ? options.phrase
@@ -61,7 +60,7 @@ Result<std::vector<ScoreLine>> read_score(const RenderOptions& options, bool is_
   return lines ? std::move(lines) : at(options.score, lines.error());
 }
 
-// What the score gives to parameters.
+// Returns the parameters that the score sets.
 std::vector<Setting> reach_of(const std::vector<ScoreLine>& lines, const Network& network) {
   constexpr std::string_view prefix = "/param/";
   std::vector<Setting> reach;
@@ -81,8 +80,8 @@ std::vector<Setting> reach_of(const std::vector<ScoreLine>& lines, const Network
   return reach;
 }
 
-// The calls of a score as events; an error has the score's line. What a parameter could not take is
-// told, once for each.
+// Converts the calls of a score to events. Errors have the line of the score. Warns once per
+// parameter about values outside its range.
 Result<std::vector<ScoredEvent>> score_events(const RenderOptions& options,
                                               const std::vector<ScoreLine>& lines,
                                               const Instrument& instrument, std::uint32_t serial,
@@ -109,13 +108,13 @@ Result<std::vector<ScoredEvent>> score_events(const RenderOptions& options,
   return scored;
 }
 
-// What drives the model's inputs, read as it is needed: nothing, or a sound file.
+// The signals of the model's inputs, streamed from a sound file; silence without one.
 struct Inputs {
   std::optional<SoundReader> file;
   std::vector<double> interleaved;
   std::vector<double> samples;  // [channel][block_frames]
   std::vector<const double*> pointers;
-  std::size_t frame = 0;  // how many have been read
+  std::size_t frame = 0;  // number of frames read
 
   explicit Inputs(std::optional<SoundReader> from) : file(std::move(from)) {
     const std::size_t channels = file ? file->channels() : 0;
@@ -126,7 +125,7 @@ struct Inputs {
     }
   }
 
-  // The next block; silence after the end. Its error is a sample that is no number.
+  // Reads the next block, with silence after the end. Fails at a sample that is not a number.
   Result<std::span<const double* const>> next(std::size_t count) {
     if (file) {
       const std::size_t got = file->read(interleaved.data(), count);
@@ -159,26 +158,26 @@ Result<std::optional<SoundReader>> open_input(const RenderOptions& options) {
   }
   if (sound->rate_hz() != options.rate_hz) {
     const std::string rate = std::to_string(static_cast<int>(sound->rate_hz()));
-    return Error{"'" + options.input + "' is at " + rate + " Hz, the render at " +
-                 std::to_string(static_cast<int>(options.rate_hz)) + "; give --rate " + rate};
+    return Error{"'" + options.input + "' is at " + rate + " Hz, but the render is at " +
+                 std::to_string(static_cast<int>(options.rate_hz)) + " Hz; pass --rate " + rate};
   }
   if (sound->frames() < 0 && !options.frames && !options.seconds) {
-    return Error{"'" + options.input + "' does not say how long it is; give --seconds"};
+    return Error{"'" + options.input + "' has no length in its header; pass --seconds"};
   }
   return std::optional<SoundReader>(*std::move(sound));
 }
 
-// What this thread has computed so far.
+// CPU time of this thread.
 double thread_cpu_s() {
   timespec time{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-// A value that the preset does not allow, at the line that says so.
+// Reports a value outside the preset's range, at the line that sets it.
 Error beyond_range(const Scene& scene, const ParameterInfo& info) {
-  Error error{"the preset keeps '" + info.name + "' between " + print_number(info.minimum) +
-              " and " + print_number(info.maximum)};
+  Error error{"the preset limits '" + info.name + "' to the range from " +
+              print_number(info.minimum) + " to " + print_number(info.maximum)};
   for (const ParameterSetting& setting : scene.preset.parameters) {
     if (setting.name == info.name) {
       error.line = setting.location.line;
@@ -203,12 +202,12 @@ long long length_in_frames(const RenderOptions& options, const std::vector<Score
                   std::llround(midi_s * options.rate_hz));
 }
 
-// The messages of a MIDI file, block by block.
+// Splits the messages of a MIDI file into blocks.
 class MidiPackets {
  public:
   MidiPackets(const MidiFile& file, double rate_hz) : file_(file), rate_hz_(rate_hz) {}
 
-  // Those of the frames from `first` on. They hold until the next call.
+  // Returns the messages of a block of frames, valid until the next call.
   std::span<const MidiPacket> next(long long first, std::size_t count) {
     packets_.clear();
     for (; next_ < file_.messages.size(); ++next_) {
@@ -250,7 +249,7 @@ std::string to_score(const std::vector<PhraseNote>& notes) {
 }
 
 Result<Rendered> render(const RenderOptions& options, const std::function<bool(double)>& progress) {
-  // Keys play a model with its default preset; what is bare has none.
+  // Notes need a preset: a bare model gets its default preset.
   auto scene = load_scene(
       options.name,
       {.bare = options.midi.empty(),
@@ -283,12 +282,13 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
     scene->warnings.push_back(
         options.midi + ": " +
         counted(static_cast<std::size_t>(changes), "program change", "program changes") +
-        " passed over; one preset is rendered");
+        " ignored; render plays one preset");
   }
   const auto threads = static_cast<std::size_t>(options.threads);
   if (threads > core_count()) {
-    scene->warnings.push_back("--threads " + std::to_string(threads) + ": this machine runs " +
-                              std::to_string(core_count()) + " at once, and so many are used");
+    scene->warnings.push_back("--threads " + std::to_string(threads) + ": using " +
+                              std::to_string(core_count()) +
+                              ", the number of cores of this machine");
   }
   ThreadPool pool(threads > 0 ? std::min(threads, core_count()) : core_count());
   auto compiled = admit(*scene,
@@ -347,7 +347,7 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
                     .channels = std::max(is_bare ? 1 : 2, instrument.outputs),
                     .warnings = scene->warnings};
   if (static_cast<double>(rendered.frames) > longest_s * options.rate_hz) {
-    return Error{"that is longer than a day of sound"};
+    return Error{"the sound would be longer than a day"};
   }
   const auto channels = static_cast<std::size_t>(rendered.channels);
   if (progress && !progress(0.0)) {

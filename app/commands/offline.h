@@ -1,4 +1,4 @@
-// app/commands: renders to a file, through the same block function as the live backends.
+// app/commands: renders to a file with the same block function as the live backends.
 #pragma once
 
 #include <functional>
@@ -17,29 +17,29 @@ namespace ressort::commands {
 
 struct RenderOptions {
   std::string name;    // model or preset
-  std::string output;  // a sound file; its ending says which
+  std::string output;  // sound file; the extension selects the format
   double rate_hz = 44100.0;
-  std::optional<double> seconds;       // at most one of these; without both: as long as score and
-  std::optional<long long> frames;     //   input last, and two seconds to ring out, or as a MIDI
-                                       //   file lasts, and until it is silent, a minute at most
-  std::string input;                   // a sound file; channel n drives input n
-  std::string score;                   // a file of calls
-  std::string midi;                    // a Standard MIDI File, beside the score or instead of one
-  std::string phrase;                  // a score itself, instead of the default phrase
-  std::vector<Setting> parameters;     // set before the first sample
-  std::optional<SampleFormat> format;  // without one, the best that the file can hold
+  std::optional<double> seconds;    // at most one of these; by default the length of the score or
+  std::optional<long long> frames;  //   the input and two seconds of decay, or of the MIDI file
+                                    //   and its decay, at most a minute
+  std::string input;                // sound file; channel N drives input N
+  std::string score;                // score file
+  std::string midi;                 // Standard MIDI File, in addition to the score
+  std::string phrase;               // text of a score, instead of the default phrase
+  std::vector<Setting> parameters;  // set before the first sample
+  std::optional<SampleFormat> format;  // empty: the best that the format supports
   Precision precision = Precision::float64;
   bool rescale = true;
-  std::optional<Method> method;        // without one, the plan's choice
-  std::optional<Budget> budget;        // instead of the preset's
-  bool is_strict = false;              // what only warns is an error
-  std::optional<ThirdArgument> third;  // whatever the model shows
-  KeyOptions keys;                     // instead of the preset's
+  std::optional<Method> method;        // empty: the plan's choice
+  std::optional<Budget> budget;        // empty: the preset's
+  bool is_strict = false;              // treats warnings about the budget as errors
+  std::optional<ThirdArgument> third;  // empty: as the model shows
+  KeyOptions keys;                     // override the preset's
   bool limit = false;
-  bool force = false;  // even if it is not stable
+  bool force = false;  // renders unstable models
   int voices = 0;
-  int threads = 0;        // for large networks; 0: as many as the machine runs at once
-  Progress loading = {};  // until the first sample; what it stops fails with `stopped`
+  int threads = 0;        // for large networks; 0: one per core
+  Progress loading = {};  // until the first sample; fails with `stopped` if it stops
 };
 
 struct Rendered {
@@ -49,15 +49,15 @@ struct Rendered {
   int channels = 0;
   double peak = 0.0;
   double rms = 0.0;
-  double cpu_s = 0.0;  // of this thread, for the sound alone
+  double cpu_s = 0.0;  // of this thread, without loading
   std::uint64_t resets = 0;
   bool was_interrupted = false;
   std::vector<std::string> warnings;
-  std::optional<Error> failure;  // of the disk; there is no file then
+  std::optional<Error> failure;  // of the disk; no file is kept
 };
 
-// `progress` gets 0..1 now and then, 0 before anything is written, and answers false to stop: what
-// is there by then is kept. [control]
+// Renders to the output file. `progress` gets the finished share, 0 before anything is written, and
+// returns false to stop; the sound so far is kept. [control]
 Result<Rendered> render(const RenderOptions& options, const std::function<bool(double)>& progress);
 
 struct PhraseNote {
@@ -67,8 +67,7 @@ struct PhraseNote {
   int velocity = 0;
 };
 
-// The short phrase that a preset plays when nobody says what to play; its end is that of its last
-// note. And notes as a score.
+// Returns the default phrase of presets, which ends with its last note; converts notes to a score.
 const std::vector<PhraseNote>& default_phrase();
 std::string to_score(const std::vector<PhraseNote>& notes);
 

@@ -1,4 +1,4 @@
-// app/commands: how far a command is, in a line of a terminal that is written over.
+// app/commands: a progress bar on one line of the terminal.
 #pragma once
 
 #include <string>
@@ -9,13 +9,13 @@ namespace ressort::commands {
 
 class ProgressBar {
  public:
-  // Shows nothing where stderr is no terminal, or nobody wants it.
+  // Shows nothing if stderr is not a terminal.
   explicit ProgressBar(bool is_wanted);
-  ~ProgressBar();  // the line is empty again
+  ~ProgressBar();  // clears the line
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
 
-  // `share` of 0..1 is done, and at what it is. Waits for no terminal. [one thread]
+  // Shows the finished share, 0..1, and the current task. Never blocks. [one thread]
   void show(double share, const std::string& what);
 
  private:

@@ -1,5 +1,4 @@
-// app/commands: prints the tables of the manual from those that the program itself reads. The exit
-// code comes back.
+// app/commands: prints the tables of the manual, generated from the program's own tables.
 #pragma once
 
 #include <span>
@@ -12,11 +11,11 @@ namespace ressort::commands {
 struct ReferencePart {
   std::string_view name;
   std::string_view lists;
-  void (*print)();  // to stdout, as a table in Markdown
+  void (*print)();  // prints a Markdown table
 };
 std::span<const ReferencePart> reference_parts();
 
-// `name` is that of a part.
+// Prints the part `name`. Returns the exit code.
 int reference(std::string_view name);
 
 }  // namespace ressort::commands

@@ -10,17 +10,13 @@ if(NOT CMAKE_CROSSCOMPILING)
     COMMAND ${CMAKE_COMMAND} -E make_directory ${packaged}
     COMMAND ressort reference man > ${packaged}/ressort.1
     COMMAND ressort reference completion > ${packaged}/ressort.bash
-    COMMAND gzip -9nf ${packaged}/ressort.1
-    COMMAND echo ".so man1/ressort.1" | gzip -9n > ${packaged}/ressort-chart.1.gz)
-  install(FILES ${packaged}/ressort.1.gz ${packaged}/ressort-chart.1.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
+    COMMAND gzip -9nf ${packaged}/ressort.1)
+  install(FILES ${packaged}/ressort.1.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
   install(FILES ${packaged}/ressort.bash
     DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME ressort)
 endif()
 
 install(TARGETS ressort)
-if(TARGET ressort-chart)
-  install(TARGETS ressort-chart OPTIONAL)
-endif()
 install(DIRECTORY models presets DESTINATION ${CMAKE_INSTALL_DATADIR}/ressort
   FILES_MATCHING PATTERN "*.mdl" PATTERN "*.toml" PATTERN "*.scl" PATTERN "*.kbm")
 install(FILES ${packaging}/ressort.desktop DESTINATION ${CMAKE_INSTALL_DATADIR}/applications)
@@ -53,6 +49,7 @@ file that you can edit while it sounds.")
 set(CPACK_DEBIAN_PACKAGE_SECTION sound)
 set(CPACK_DEBIAN_PACKAGE_PRIORITY optional)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS gnuplot-nox)  # draws the figures
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)

@@ -31,9 +31,9 @@ struct Bar {
 };
 
 // The network for unit masses: row i is mass i times the square root of its M.
-class Body {
+class ContinuousBody {
  public:
-  Body(const Network& network, std::span<const double> parameters)
+  ContinuousBody(const Network& network, std::span<const double> parameters)
       : network_(network), parameters_(parameters), row_(network.masses.size(), held) {
     for (std::size_t i = 0; i < network.masses.size(); ++i) {
       if (moves(network.masses[i])) {
@@ -158,7 +158,7 @@ class Body {
 
 class Solver {
  public:
-  Solver(const Network& network, const Body& body) : body_(body) {
+  Solver(const Network& network, const ContinuousBody& body) : body_(body) {
     for (const Output& output : network.outputs) {
       reading_.push_back(body.reading(output));
       made_.outputs.push_back({.rest = -reading_.back().offset});
@@ -343,7 +343,7 @@ class Solver {
               });
   }
 
-  const Body& body_;
+  const ContinuousBody& body_;
   std::vector<Bar> reading_;  // [output]
   Vector x_;                  // [row] Position at the start.
   Vector v_;
@@ -388,7 +388,7 @@ std::optional<Continuous> solve_continuous(const Network& network,
   if (!network.macros.empty()) {
     return solve_continuous(expand_macros(network), parameters);
   }
-  const Body body(network, parameters);
+  const ContinuousBody body(network, parameters);
   if (!is_linear(network) || !body.has_mass() || body.size() > most_exact_modes ||
       std::any_of(network.outputs.begin(), network.outputs.end(),
                   [](const Output& output) { return output.is_force; })) {

@@ -16,7 +16,7 @@
 #include "app/realtime/denormals.h"
 #include "core/compile/plan.h"
 #include "core/model/language/mdl.h"
-#include "tests/bench/faust_picture.h"
+#include "tests/bench/figures.h"
 #include "tests/bench/fit.h"
 #include "tests/bench/limit.h"
 #include "tests/bench/measure.h"
@@ -40,7 +40,7 @@ const char* const usage =
     "  --quick      a glance: less exact\n"
     "  --isa NAME   base, v3 or v4; without it, the best of this machine\n"
     "  --seconds S  to measure each scene for; 4 without it\n"
-    "  -o DIR       where bench.csv, cost.png, cost.svg and faust.svg go; build/bench without it\n"
+    "  -o DIR       where bench.csv, cost.svg and faust.svg go; build/bench without it\n"
     "  --list       the scenes' names\n";
 
 struct Options {
@@ -120,6 +120,19 @@ void show_progress(std::size_t done, std::size_t all, const std::string& doing) 
   if (done == all) {
     std::fprintf(stderr, "\r\033[K");
   }
+}
+
+// Writes a figure as SVG, if it has anything to show.
+void draw(const plot::Figure& figure, const std::filesystem::path& path) {
+  if (figure.panels.empty()) {
+    return;
+  }
+  const auto svg = plot::to_svg(figure);
+  if (!svg) {
+    std::fprintf(stderr, "%s: %s\n", path.c_str(), svg.error().message.c_str());
+    return;
+  }
+  std::ofstream(path) << *svg;
 }
 
 // --- one scene ----------------------------------------------------------------------------------
@@ -334,13 +347,9 @@ int run(const Options& options) {
   print_predictions(rows);
   print_regrets(rows);
   const bool is_written = write_csv(options.folder / "bench.csv", isa, rows);
-  if (std::any_of(rows.begin(), rows.end(), [](const Row& row) { return !row.family.empty(); }) &&
-      !draw(options.folder, machine_line(isa), rows)) {
-    std::fprintf(stderr, "no picture: gnuplot does not run\n");
-  }
-  if (const std::string svg = faust_picture(machine_line(isa), rows); !svg.empty()) {
-    std::ofstream(options.folder / "faust.svg") << svg;
-  }
+  const std::string machine = machine_line(isa);
+  draw(cost_figure(machine, rows), options.folder / "cost.svg");
+  draw(faust_figure(machine, rows), options.folder / "faust.svg");
   return stops != 0 ? 130 : is_written ? 0 : 1;
 }
 

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
-#include <map>
 
 namespace ressort::bench {
 namespace {
@@ -42,69 +41,6 @@ std::string cpu_name() {
 
 std::string shown_method(const Row& row) {
   return row.form.empty() ? row.method : row.method + ": " + row.form;
-}
-
-// A curve of the picture: one method in one precision, its points as gnuplot's data.
-struct Curve {
-  std::string method;
-  bool is_double = true;
-  std::string points;
-};
-
-// Of all that FAUST was made to try, only the fastest of each scene is drawn.
-std::vector<Curve> curves_of(const std::string& family, const std::vector<Row>& rows) {
-  std::vector<Curve> curves;
-  const auto add = [&](const Row& row, const std::string& method, double times) {
-    auto curve = std::find_if(curves.begin(), curves.end(), [&](const Curve& known) {
-      return known.method == method && known.is_double == row.is_double;
-    });
-    if (curve == curves.end()) {
-      curve = curves.insert(curve, {method, row.is_double, ""});
-    }
-    curve->points +=
-        std::to_string(row.masses) + " " + number("%.6g", times * ns_per_mass(row)) + "\n";
-  };
-  for (const Row& row : rows) {
-    if (row.family == family && !row.method.starts_with("faust")) {
-      add(row, row.method, 1.0);
-    }
-    if (row.family == family && row.method == "ressort" && row.is_double && row.than_best_faust) {
-      add(row, "best FAUST", *row.than_best_faust);
-    }
-  }
-  return curves;
-}
-
-// The same in every panel.
-std::string style_of(const Curve& curve) {
-  static const std::map<std::string, std::string> colours{
-      {"ressort", "black"}, {"direct", "red"},    {"chains", "blue"},      {"modal", "#008040"},
-      {"grid", "purple"},   {"batch", "#c0a000"}, {"reference", "gray50"}, {"best FAUST", "brown"}};
-  return " with linespoints linecolor rgb \"" + colours.at(curve.method) + "\" linewidth " +
-         (curve.method == "ressort" ? "2.5" : "1.2") + " dashtype " + (curve.is_double ? "1" : "2");
-}
-
-std::string panel(const std::string& family, const std::vector<Row>& rows) {
-  std::string data;
-  std::string plot;
-  for (const Curve& curve : curves_of(family, rows)) {
-    const std::string block = "$" + family + std::to_string(plot.size());
-    data += block + " << EOD\n" + curve.points + "EOD\n";
-    plot += (plot.empty() ? "plot " : ", ") + block + style_of(curve) + " title \"" + curve.method +
-            (curve.is_double ? "" : ", float") + "\"";
-  }
-  return plot.empty() ? "" : data + "set title \"" + family + "\"\n" + plot + "\n";
-}
-
-std::string picture(const std::filesystem::path& folder, const std::string& machine,
-                    const std::vector<Row>& rows, const std::string& terminal,
-                    const std::string& name) {
-  return "reset\nset terminal " + terminal + "\nset output \"" + (folder / name).string() +
-         "\"\nset logscale xy\nset grid\nset key outside below\nset xlabel \"masses\"\n"
-         "set ylabel \"ns per mass and sample\"\nset format x \"10^%T\"\n"
-         "set multiplot layout 1,2 title \"" +
-         machine + "\" noenhanced\n" + panel("chains", rows) + panel("meshes", rows) +
-         "unset multiplot\nset output\n";
 }
 
 }  // namespace
@@ -211,19 +147,6 @@ bool write_csv(const std::filesystem::path& path, const std::string& isa,
   }
   file.close();
   return file.good();
-}
-
-bool draw(const std::filesystem::path& folder, const std::string& machine,
-          const std::vector<Row>& rows) {
-  FILE* const gnuplot = popen("gnuplot 2>/dev/null", "w");
-  if (gnuplot == nullptr) {
-    return false;
-  }
-  const std::string script =
-      picture(folder, machine, rows, "pngcairo size 1600,800", "cost.png") +
-      picture(folder, machine, rows, "svg size 1600,800 background \"white\"", "cost.svg");
-  std::fputs(script.c_str(), gnuplot);
-  return pclose(gnuplot) == 0;
 }
 
 }  // namespace ressort::bench

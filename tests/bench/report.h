@@ -45,9 +45,5 @@ void print_predictions(const std::vector<Row>& rows);
 void print_regrets(const std::vector<Row>& rows);
 bool write_csv(const std::filesystem::path& path, const std::string& isa,
                const std::vector<Row>& rows);
-// cost.png and cost.svg in `folder`, by gnuplot: cost per mass against the number of masses. False
-// where there is no gnuplot.
-bool draw(const std::filesystem::path& folder, const std::string& machine,
-          const std::vector<Row>& rows);
 
 }  // namespace ressort::bench

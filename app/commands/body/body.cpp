@@ -9,7 +9,9 @@ namespace ressort::commands {
 int body_command(const BodyRequest& request) {
   const bool is_model = request.input.ends_with(".mdl") || request.input.ends_with(".toml");
   if (!is_model && !request.network.chain.empty()) {
-    std::fprintf(stderr, "--chain is for models: make the body first, then its chain\n");
+    std::fprintf(
+        stderr,
+        "--chain needs a model: convert the file to a body first, then the body to a chain\n");
     return exit_code::wrong_use;
   }
   const auto common = [&](auto options) {

@@ -1,5 +1,5 @@
-// app/commands: makes a body, a thing that can be struck, of what a file holds: a recording, a
-// solid, or another model. The exit code comes back.
+// app/commands: converts a recording, a solid or a model into a modal body. Functions return the
+// exit code.
 #pragma once
 
 #include <cstddef>
@@ -10,28 +10,28 @@
 
 namespace ressort::commands {
 
-// Of recordings.
+// Options for recordings.
 struct BodyOptions {
   std::string input;
-  std::string output;   // a file; empty: to stdout
-  std::string picture;  // a file; empty: none
-  bool force = false;   // write over files that are there
+  std::string output;   // empty: stdout
+  std::string picture;  // .svg; empty: none
+  bool force = false;   // overwrites existing files
   bool as_json = false;
   std::size_t most_modes = 400;
-  double floor_db = -70.0;  // of a mode's energy, below that of the one with most
+  double floor_db = -70.0;  // energy of the weakest mode, relative to the strongest
   double mass = 40.0;       // of every mode
 };
 
-// Of models.
+// Options for models.
 struct NetworkBodyOptions {
   std::string input;
   std::string output;
   bool force = false;
-  std::size_t modes = 0;  // the lowest; 0: all
-  std::string chain;      // a place: masses and springs that answer there as the model does
+  std::size_t modes = 0;  // number, from the lowest; 0: all
+  std::string chain;      // place whose response a chain gets; empty: no chain
 };
 
-// What the command line says, whatever the file is.
+// Options of the command line for all kinds of files.
 struct BodyRequest {
   BodyOptions recording;
   SolidBodyOptions solid;
@@ -43,10 +43,10 @@ struct BodyRequest {
   std::optional<int> modes;
 };
 
-// The ending of the input's name says what it is. [main]
+// Selects the kind of file by its extension. [main]
 int body_command(const BodyRequest& request);
 
-// Of a recording, and of a model. [main]
+// Convert a recording and a model. [main]
 int recording_body(const BodyOptions& options);
 int network_body(const NetworkBodyOptions& options);
 

@@ -28,7 +28,7 @@ using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
 constexpr std::size_t max_mesh_bytes = std::size_t{1} << 31;
-constexpr double far_off = 1.4;  // a mesh that is so much finer or coarser than asked is made anew
+constexpr double far_off = 1.4;  // a mesh finer or coarser than this factor is made again
 
 bool is_installed(const std::string& program) {
   const char* const path = std::getenv("PATH");
@@ -44,14 +44,14 @@ bool is_installed(const std::string& program) {
   return false;
 }
 
-// A folder of our own for what the programs read and write, gone in the end.
+// A temporary folder for the files of the meshers.
 class WorkFolder {
  public:
   static Result<WorkFolder> make() {
     std::error_code error;
     std::string name = (fs::temp_directory_path(error) / "ressort-XXXXXX").string();
     if (error || mkdtemp(name.data()) == nullptr) {
-      return Error{"no folder for the mesh can be made: " +
+      return Error{"cannot create a folder for the mesh: " +
                    std::error_code(errno, std::generic_category()).message()};
     }
     return WorkFolder(name);
@@ -72,7 +72,7 @@ class WorkFolder {
   std::string name_;
 };
 
-// The last lines of what a program said.
+// Returns the last lines of a log.
 std::string last_words(const std::string& log) {
   constexpr std::size_t most = 600;
   std::string text = read_bytes(log, max_mesh_bytes) ? *read_bytes(log, max_mesh_bytes) : "";
@@ -85,10 +85,10 @@ std::string last_words(const std::string& log) {
   for (char& c : text) {
     c = static_cast<unsigned char>(c) < 0x20 && c != '\n' ? ' ' : c;
   }
-  return text.empty() ? "it said nothing" : "it said:\n" + text;
+  return text.empty() ? "no messages" : "its last messages:\n" + text;
 }
 
-// Runs a program in the folder, what it says goes into the file "log" there.
+// Runs a program in the folder, with its output in the file "log" there.
 Result<Done> run(std::vector<std::string> words, const WorkFolder& folder, double limit_s,
                  const std::function<bool()>& goes_on) {
   std::vector<char*> arguments;
@@ -99,12 +99,12 @@ Result<Done> run(std::vector<std::string> words, const WorkFolder& folder, doubl
   const std::string log = folder.file("log");
   const pid_t child = fork();
   if (child < 0) {
-    return Error{words[0] + " cannot be started: " +
+    return Error{"cannot start " + words[0] + ": " +
                  std::error_code(errno, std::generic_category()).message()};
   }
   if (child == 0) {
-    setpgid(0, 0);                     // Ctrl-C comes to us, and we end it
-    prctl(PR_SET_PDEATHSIG, SIGKILL);  // and so does our own end, whatever ends us
+    setpgid(0, 0);                     // Ctrl-C reaches only this process, which ends the child
+    prctl(PR_SET_PDEATHSIG, SIGKILL);  // the child ends with this process
     const int out = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
     const int in = open("/dev/null", O_RDONLY | O_CLOEXEC);
     if (out >= 0 && in >= 0 && chdir(folder.name().c_str()) == 0) {
@@ -123,7 +123,7 @@ Result<Done> run(std::vector<std::string> words, const WorkFolder& folder, doubl
       break;
     }
     if (ended < 0 && errno != EINTR) {
-      return Error{words[0] + " was lost"};
+      return Error{"lost contact with " + words[0]};
     }
     const bool is_late = Clock::now() > end;
     if (is_late || !goes_on()) {
@@ -131,8 +131,8 @@ Result<Done> run(std::vector<std::string> words, const WorkFolder& folder, doubl
       kill(child, SIGKILL);
       while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
       }
-      return Error{is_late ? words[0] + " took longer than " + print_number(limit_s) +
-                                 " s and was ended; a coarser mesh takes less"
+      return Error{is_late ? words[0] + " was stopped after " + print_number(limit_s) +
+                                 " s; use a coarser mesh"
                            : stopped};
     }
     std::this_thread::sleep_for(milliseconds(5));
@@ -146,7 +146,7 @@ Result<Done> run(std::vector<std::string> words, const WorkFolder& folder, doubl
   return Done{};
 }
 
-// With the surface made anew in triangles of this size; without, on the triangles as they are.
+// Remeshes the surface in triangles of this size, or keeps the triangles of the file.
 std::string gmsh_script(double edge, bool makes_surface_anew) {
   return std::string("General.Terminal = 1;\nMerge \"surface.stl\";\n") +
          (makes_surface_anew ? "ClassifySurfaces{40 * Pi / 180, 1, 1, Pi};\nCreateGeometry;\n"
@@ -179,7 +179,7 @@ Result<TetrahedronMesh> by_gmsh(const ClosedSurface& closed, double edge, const 
       if (mesh && !mesh->tetrahedra.empty()) {
         return mesh;
       }
-      first = anew || mesh ? Error{"gmsh made no tetrahedra; " + last_words(folder.file("log"))}
+      first = anew || mesh ? Error{"gmsh produced no tetrahedra; " + last_words(folder.file("log"))}
                            : mesh.error();
     } else if (ran.error().message == stopped) {
       return ran.error();
@@ -197,7 +197,7 @@ Result<TetrahedronMesh> by_tetgen(const ClosedSurface& closed, double edge,
       !written) {
     return written.error();
   }
-  char switches[64];  // TetGen reads no exponents there
+  char switches[64];  // TetGen cannot read exponents here
   std::snprintf(switches, sizeof switches, "-pq1.4a%.24fQ", edge * edge * edge / 8.5);
   if (auto ran = run({"tetgen", switches, "body.smesh"}, folder, order.limit_s, goes_on); !ran) {
     return ran.error();
@@ -205,7 +205,7 @@ Result<TetrahedronMesh> by_tetgen(const ClosedSurface& closed, double edge,
   const auto nodes = read_bytes(folder.file("body.1.node"), max_mesh_bytes);
   const auto elements = read_bytes(folder.file("body.1.ele"), max_mesh_bytes);
   if (!nodes || !elements) {
-    return Error{"tetgen made no tetrahedra; " + last_words(folder.file("log"))};
+    return Error{"tetgen produced no tetrahedra; " + last_words(folder.file("log"))};
   }
   return read_tetgen(*nodes, *elements);
 }
@@ -215,7 +215,7 @@ std::size_t unknowns_of(const TetrahedronMesh& mesh) {
   return solid ? solid->unknowns() : 0;
 }
 
-// Once more with another size where the first is far from what was asked for.
+// Meshes again with another size if the first mesh is far from the requested number of unknowns.
 Result<TetrahedronMesh> fitted(double edge, double unknowns, const Fill& fill) {
   auto mesh = fill(edge);
   if (!mesh) {
@@ -231,7 +231,7 @@ Result<TetrahedronMesh> fitted(double edge, double unknowns, const Fill& fill) {
   return mesh;
 }
 
-// To the volume that the surface has: what is round loses some where it is cut into straight edges.
+// Scales the mesh to the volume of the surface: straight edges cut off some of a round solid.
 void restore_volume(TetrahedronMesh& mesh, const ClosedSurface& closed) {
   double six = 0.0;
   for (const Tetrahedron& t : mesh.tetrahedra) {
@@ -263,8 +263,8 @@ Result<Meshed> fill_with_tetrahedra(const ClosedSurface& closed, const MeshOrder
     }
     if (order.mesher == Mesher::own) {
       return Error{
-          "it is no box, which is all that is filled without a program; --mesher gmsh or "
-          "tetgen takes any solid"};
+          "not a box or a ball, the only shapes that ressort meshes itself; pass --mesher gmsh or "
+          "tetgen"};
     }
   }
   const double edge = edge_length(closed.volume, order.unknowns);
@@ -296,12 +296,11 @@ Result<Meshed> fill_with_tetrahedra(const ClosedSurface& closed, const MeshOrder
     }
     failures += (failures.empty() ? "" : "\n") + mesh.error().message;
   }
-  return Error{
-      !failures.empty()
-          ? failures
-          : "to fill it with tetrahedra needs gmsh or tetgen, and " +
-                std::string(order.mesher == Mesher::automatic ? "neither is" : "it is not") +
-                " installed: apt install gmsh; boxes and balls need neither"};
+  return Error{!failures.empty()
+                   ? failures
+                   : std::string(order.mesher == Mesher::automatic ? "neither gmsh nor tetgen is"
+                                                                   : "the mesher is not") +
+                         " installed; install the package gmsh (boxes and balls need no mesher)"};
 }
 
 }  // namespace ressort::commands

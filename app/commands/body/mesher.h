@@ -1,5 +1,5 @@
-// app/commands: fills a surface with tetrahedra by a program that does that for a living, started
-// as a process of its own, or by ourselves where the solid is a box or a ball.
+// app/commands: fills a surface with tetrahedra. Runs gmsh or tetgen, or meshes boxes and balls
+// itself.
 #pragma once
 
 #include <functional>
@@ -12,16 +12,16 @@
 namespace ressort::commands {
 
 enum class Mesher {
-  automatic,  // what fits of the others, the first first
-  own,        // boxes and balls alone
-  gmsh,       // makes the surface anew, as fine as it is to be
-  tetgen,     // keeps the surface and makes it finer where needed
+  automatic,  // the first of the others that is possible
+  own,        // boxes and balls only
+  gmsh,       // remeshes the surface
+  tetgen,     // refines the surface of the file
 };
 
 struct MeshOrder {
   Mesher mesher = Mesher::automatic;
-  double unknowns = 40000.0;  // about so many; three a node
-  double limit_s = 300.0;     // a program that takes longer is ended
+  double unknowns = 40000.0;  // approximate number; three per node
+  double limit_s = 300.0;     // a mesher is stopped after this time
 };
 
 struct Meshed {
@@ -29,8 +29,9 @@ struct Meshed {
   std::string by;  // "gmsh"
 };
 
-// The error says what to install, or what the program said. Ends the program and fails with
-// `stopped` where `goes_on`, which is asked some times a second, says no.
+// Meshes the solid. Errors say what to install, or have the last messages of the mesher. `goes_on`,
+// which is called some times a second, returns false to end the mesher; the error is `stopped`
+// then.
 Result<Meshed> fill_with_tetrahedra(const ClosedSurface& closed, const MeshOrder& order,
                                     const std::function<bool()>& goes_on);
 

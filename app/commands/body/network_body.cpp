@@ -1,4 +1,4 @@
-// A model's own modes as a body, or as a chain.
+// Converts the modes of a model to a body or a chain.
 #include <algorithm>
 #include <cstdio>
 
@@ -21,7 +21,7 @@ int refuse(const std::string& message) {
   return exit_code::wrong_use;
 }
 
-// Its inputs and outputs, so that it can be played at once.
+// Returns inputs and outputs, so that the body can be played immediately.
 std::string ports_of(const PlacedModes& body) {
   std::string text;
   for (const std::string& place : body.places) {
@@ -32,8 +32,8 @@ std::string ports_of(const PlacedModes& body) {
   return text;
 }
 
-// A place of a body, or an input or output as `placed_modes` calls it: there the model gets an
-// input that it need not have. Its name among the places.
+// Finds the place of the chain: a place of a body, or an input or an output, named as by
+// `placed_modes`. Adds an input there if the model has none. Returns the name of the place.
 std::string listen_at(Network& network, const std::string& place) {
   for (std::uint32_t i = 0; i < network.macros.size(); ++i) {
     const std::vector<std::string>& places = network.macros[i].places;
@@ -56,7 +56,7 @@ std::string listen_at(Network& network, const std::string& place) {
   return place;
 }
 
-// The first mass of a chain is struck and heard.
+// The first mass of a chain is both struck and heard.
 std::string ports_of(const ModalChain& chain) {
   const auto first = std::find_if(chain.network.masses.begin(), chain.network.masses.end(), moves);
   const std::string name = first->name.text();
@@ -70,7 +70,7 @@ int network_body(const NetworkBodyOptions& options) {
                 [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
   const Progress progress([&](std::string_view stage) {
     news.at(stage);
-    return true;  // Ctrl-C ends it at once
+    return true;  // Ctrl-C ends the process
   });
   auto scene = load_scene(options.input, {.progress = progress});
   if (!scene) {
@@ -89,30 +89,31 @@ int network_body(const NetworkBodyOptions& options) {
   PlacedModes body = placed_modes(*modes);
   body.name = is_identifier(scene->name) ? scene->name : "body";
   if (body.modes.empty() || body.places.empty()) {
-    return refuse(options.input +
-                  ": nothing that an input pushes and an output hears swings, so there is no body "
-                  "to be made of it");
+    return refuse(
+        options.input +
+        ": no mode is both driven by an input and heard at an output, so there is no body");
   }
   if (options.modes > 0 && body.modes.size() > options.modes) {
     body.modes.resize(options.modes);
   }
   std::string text = "# The modes of " + scene->name +
-                     " as the published scheme plays them, at its "
-                     "inputs and outputs.\n";
+                     " in the published scheme, at its inputs and "
+                     "outputs.\n";
   if (!options.chain.empty()) {
     const auto chain = chain_of(body, place);
     if (!chain) {
       return refuse(options.input + ": " + chain.error().message);
     }
-    text = "# A chain that answers as " + scene->name + " does at " + options.chain +
-           "; a decay is off by at most " + fixed(chain->worst_t60_percent, 2) + " %.\n" +
+    text = "# A chain with the response of " + scene->name + " at " + options.chain +
+           "; largest error of a T60: " + fixed(chain->worst_t60_percent, 2) + " %.\n" +
            print_network(chain->network) + ports_of(*chain);
   } else {
     if (body.left_out > 1e-3) {
-      std::fprintf(stderr,
-                   "its places swing at different times, which those of a body cannot: up to "
-                   "%.1f %% of a mode is left out\n",
-                   100.0 * body.left_out);
+      std::fprintf(
+          stderr,
+          "warning: the places move with different phases, which a body cannot represent; up to "
+          "%.1f %% of a mode is lost\n",
+          100.0 * body.left_out);
     }
     text += body_text(body) + ports_of(body);
   }

@@ -7,6 +7,7 @@
 #include "app/commands/body/body.h"
 #include "app/commands/body/recording_picture.h"
 #include "app/commands/body/recording_text.h"
+#include "app/commands/put_figure.h"
 #include "app/exit_code.h"
 #include "app/session/files.h"
 #include "app/session/load_news.h"
@@ -19,7 +20,7 @@ namespace {
 
 constexpr double longest_read_s = 60.0;
 
-// The recording's beginning; `was_longer` if there was more.
+// Reads at most a minute; sets `was_longer` if there is more.
 Result<Recording> read_recording(const std::string& path, bool& was_longer) {
   auto file = SoundReader::open(path);
   if (!file) {
@@ -64,7 +65,7 @@ Result<Identification> identify_recording(const std::string& path, const Identif
                  (was_longer ? " in its first " + fixed(longest_read_s, 0) + " s" : "")};
   }
   if (was_longer) {
-    found->warnings.push_back("only its first " + fixed(longest_read_s, 0) + " s were read");
+    found->warnings.push_back("only the first " + fixed(longest_read_s, 0) + " s are used");
   }
   return found;
 }
@@ -77,13 +78,17 @@ int recording_body(const BodyOptions& options) {
     }
   }
   if (!options.picture.empty() && !options.picture.ends_with(".svg")) {
-    return complain_of("'" + options.picture + "' is no name of a picture; it ends in .svg");
+    return complain_of("--picture: expected a file that ends in .svg, found '" + options.picture +
+                       "'");
+  }
+  if (auto found = plot::check_gnuplot(); !options.picture.empty() && !found) {
+    return complain_of(options.picture + ": " + found.error().message);
   }
   LoadNews news(options.input,
                 [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
   const Progress progress([&](std::string_view stage) {
     news.at(stage);
-    return true;  // Ctrl-C ends it at once
+    return true;  // Ctrl-C ends the process
   });
   const auto found = identify_recording(
       options.input, {.most_modes = options.most_modes, .floor_db = options.floor_db}, progress);
@@ -96,7 +101,7 @@ int recording_body(const BodyOptions& options) {
   const std::string source = options.input.substr(options.input.rfind('/') + 1);
   if (!options.picture.empty()) {
     if (const int code =
-            put_text(options.picture, recording_picture(*found, source), options.force)) {
+            put_figure(options.picture, recording_figure(*found, source), options.force)) {
       return code;
     }
   }
@@ -117,7 +122,7 @@ int recording_body(const BodyOptions& options) {
     const std::string where = found->modes.size() == 1
                                   ? "at " + fixed(lowest_hz, 1)
                                   : "from " + fixed(lowest_hz, 1) + " to " + fixed(highest_hz, 1);
-    std::printf("%s: %s %s Hz, %s dB not explained\n", options.output.c_str(),
+    std::printf("%s: %s %s Hz, residual %s dB\n", options.output.c_str(),
                 counted(found->modes.size(), "mode", "modes").c_str(), where.c_str(),
                 fixed(found->residual_db, 1).c_str());
   }

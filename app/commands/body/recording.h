@@ -1,4 +1,4 @@
-// app/commands: what rings in a recording.
+// app/commands: finds the modes in a recording.
 #pragma once
 
 #include <string>
@@ -10,8 +10,8 @@
 
 namespace ressort::commands {
 
-// Of the first minute of a sound file; that there was more is among its warnings. The error names
-// the file. Blocks. [any thread but audio]
+// Finds modes in the first minute of a sound file; warns if the file is longer. Errors have the
+// file name. Blocks. [any thread but audio]
 Result<Identification> identify_recording(const std::string& path, const IdentifyOptions& options,
                                           const Progress& progress);
 

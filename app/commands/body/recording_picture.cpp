@@ -4,38 +4,20 @@
 #include <bit>
 #include <cmath>
 #include <complex>
-#include <numbers>
 #include <vector>
 
-#include "app/commands/svg.h"
+#include "app/rooms.h"
 #include "app/text.h"
 #include "core/linear_algebra/fourier.h"
 
 namespace ressort::commands {
 namespace {
 
-constexpr double width = 900.0;
-constexpr double left = 62.0;
-constexpr double right = 18.0;
 constexpr double floor_db = -110.0;
 constexpr double lowest_hz = 20.0;
-const char* const mode_ink = "#c8402f";
-const char* const sound_ink = "#555";
-const char* const residual_ink = "#4a74a8";
+constexpr double pixels = 1600.0;  // of a spectrum
 
-struct Panel {
-  double top = 0.0;
-  double height = 0.0;
-  double highest_hz = 20000.0;
-
-  double x_of(double frequency_hz) const {
-    return left + (width - left - right) * std::log(frequency_hz / lowest_hz) /
-                      std::log(highest_hz / lowest_hz);
-  }
-  double bottom() const { return top + height; }
-};
-
-// The magnitude of each bin of all channels, the first so many samples, a power of two.
+// Root of the power of all channels in each bin, over the first `size` samples, a power of two.
 std::vector<double> magnitudes(const std::vector<std::vector<double>>& channels, std::size_t size) {
   Fourier fourier(size);
   std::vector<double> power(size / 2);
@@ -55,18 +37,23 @@ std::vector<double> magnitudes(const std::vector<std::vector<double>>& channels,
 }
 
 double level_db(double magnitude) {
-  return 20.0 * std::log10(std::max(magnitude, 1e-15));
+  return std::clamp(20.0 * std::log10(std::max(magnitude, 1e-15)), floor_db, 0.0);
 }
 
-// The highest bin of each pixel, as an area down to the panel's floor.
-std::string curve(const std::vector<double>& bins, double rate_hz, double reference,
-                  const Panel& panel, const char* colour) {
-  const double bin_hz = 0.5 * rate_hz / static_cast<double>(bins.size());
-  std::string path = "M" + px(left) + " " + px(panel.bottom());
-  const auto columns = static_cast<int>(2.0 * (width - left - right));
-  const double ratio = std::pow(panel.highest_hz / lowest_hz, 1.0 / columns);
-  for (int column = 0; column < columns; ++column) {
-    const double low_hz = lowest_hz * std::pow(ratio, column);
+// Spectra of a recording share their reference and their axes.
+struct Scale {
+  double rate_hz = 0.0;
+  double highest_hz = 0.0;
+  double reference = 1.0;  // the strongest bin
+};
+
+// The strongest bin of each pixel, filled down to the floor.
+plot::Series filled(const std::vector<double>& bins, const Scale& scale, const char* colour) {
+  const double bin_hz = 0.5 * scale.rate_hz / static_cast<double>(bins.size());
+  const double ratio = std::pow(scale.highest_hz / lowest_hz, 1.0 / pixels);
+  plot::Series series{.style =
+                          "filledcurves y1=" + fixed(floor_db, 0) + " lc rgb '" + colour + "'"};
+  for (double low_hz = lowest_hz; low_hz < scale.highest_hz; low_hz *= ratio) {
     const auto from = static_cast<std::size_t>(low_hz / bin_hz);
     const auto to = std::min(bins.size(),
                              std::max(from + 1, static_cast<std::size_t>(low_hz * ratio / bin_hz)));
@@ -75,126 +62,83 @@ std::string curve(const std::vector<double>& bins, double rate_hz, double refere
     }
     const double most = *std::max_element(bins.begin() + static_cast<std::ptrdiff_t>(from),
                                           bins.begin() + static_cast<std::ptrdiff_t>(to));
-    const double db = std::clamp(level_db(most / reference), floor_db, 0.0);
-    path += "L" + px(left + 0.5 * column) + " " + px(panel.top + panel.height * db / floor_db);
+    series.data += plot::row({low_hz, level_db(most / scale.reference)});
   }
-  return "<path d=\"" + path + "L" + px(width - right) + " " + px(panel.bottom()) + "Z\" fill=\"" +
-         colour + "\"/>\n";
+  return series;
 }
 
-std::string frequency_grid(const Panel& panel) {
-  std::string svg;
-  for (const double hz : {50.0, 100.0, 200.0, 500.0, 1e3, 2e3, 5e3, 1e4}) {
-    if (hz < panel.highest_hz) {
-      svg += line(panel.x_of(hz), panel.top, panel.x_of(hz), panel.bottom(), grid_ink);
-    }
-  }
-  return svg;
-}
-
-std::string frequency_axis(const Panel& panel) {
-  std::string svg;
-  for (const double hz : {50.0, 100.0, 200.0, 500.0, 1e3, 2e3, 5e3, 1e4}) {
-    if (hz < panel.highest_hz) {
-      svg += label(panel.x_of(hz), panel.bottom() + 15.0, hertz(hz), "middle");
-    }
-  }
-  return svg + label(width - right, panel.bottom() + 15.0, "Hz");
-}
-
-std::string level_axis(const Panel& panel) {
-  std::string svg;
-  for (double db = 0.0; db >= floor_db; db -= 20.0) {
-    const double y = panel.top + panel.height * db / floor_db;
-    svg += line(left, y, width - right, y, grid_ink, "0.4") +
-           label(left - 6.0, y + 3.5, fixed(db, 0) + (db == 0.0 ? " dB" : ""));
-  }
-  return svg;
-}
-
-// The spectrum's peak that each mode alone would have.
-std::string marks(const Identification& found, std::size_t frames, double reference,
-                  const Panel& panel) {
-  std::string svg;
+// The height of the peak that each mode alone has in the spectrum: the geometric sum of its decay.
+plot::Series peaks(const Identification& found, const Scale& scale) {
+  const auto frames = static_cast<double>(found.sound[0].size());
+  plot::Series series{
+      .style = "points pt 6 ps 0.7 lw 1.3 lc rgb '" + std::string(plot::accent) + "'",
+      .data = {},
+      .title = "modes"};
+  const double since_samples =
+      (found.onset_s + found.skipped_s - found.time_zero_s) * found.rate_hz;
   for (const IdentifiedMode& mode : found.modes) {
     const double alpha = std::log(1000.0) / (mode.t60_s.value * found.rate_hz);
     double square = 0.0;
     for (const Measured& amplitude : mode.amplitude) {
       square += amplitude.value * amplitude.value;
     }
-    const double since =
-        (found.onset_s + found.skipped_s - found.time_zero_s) * found.rate_hz;  // samples
-    const double peak = 0.5 * std::sqrt(square) * std::exp(-alpha * since) *
-                        -std::expm1(-alpha * static_cast<double>(frames)) / -std::expm1(-alpha);
-    const double db = std::clamp(level_db(peak / reference), floor_db, 0.0);
-    svg += "<circle cx=\"" + px(panel.x_of(mode.frequency_hz.value)) + "\" cy=\"" +
-           px(panel.top + panel.height * db / floor_db) + "\" r=\"3.2\" fill=\"none\" stroke=\"" +
-           mode_ink + "\" stroke-width=\"1.3\"/>\n";
+    const double peak = 0.5 * std::sqrt(square) * std::exp(-alpha * since_samples) *
+                        -std::expm1(-alpha * frames) / -std::expm1(-alpha);
+    series.data += plot::row({mode.frequency_hz.value, level_db(peak / scale.reference)});
   }
-  return svg;
+  return series;
 }
 
-// A bar up to each T60, and a thin one over what it may be.
-std::string decays(const Identification& found, const Panel& panel) {
+plot::Panel spectrum_panel(const std::string& title, double height, const Scale& scale,
+                           std::vector<plot::Series> series) {
+  return {.title = title,
+          .x = plot::frequency_axis(lowest_hz, scale.highest_hz),
+          .y = {.title = "dB", .from = floor_db, .to = 3.0},
+          .series = std::move(series),
+          .height = height};
+}
+
+plot::Panel decay_panel(const Identification& found, const Scale& scale) {
+  plot::Series bars{.style = "impulses lw 2 lc rgb '" + std::string(plot::accent) + "'"};
+  plot::Series deviations{.style = "yerrorbars pt 0 lw 1 lc rgb '" + std::string(plot::ink) + "'",
+                          .data = {},
+                          .title = "standard deviation",
+                          .columns = "1:2:3:4"};
   double least = HUGE_VAL;
   double most = 0.0;
   for (const IdentifiedMode& mode : found.modes) {
-    least = std::min(least, mode.t60_s.value);
-    most = std::max(most, mode.t60_s.value);
+    const Measured& t60_s = mode.t60_s;
+    least = std::min(least, t60_s.value);
+    most = std::max(most, t60_s.value);
+    bars.data += plot::row({mode.frequency_hz.value, t60_s.value});
+    deviations.data += plot::row({mode.frequency_hz.value, t60_s.value,
+                                  std::max(0.1 * t60_s.value, t60_s.value - t60_s.deviation),
+                                  t60_s.value + t60_s.deviation});
   }
-  const double low = std::pow(10.0, std::floor(std::log10(0.7 * least)));
-  const double high = std::pow(10.0, std::ceil(std::log10(1.1 * most)));
-  const auto y_of = [&](double t60_s) {
-    return panel.bottom() -
-           panel.height * std::clamp(std::log(t60_s / low) / std::log(high / low), 0.0, 1.0);
-  };
-  std::string svg = frequency_grid(panel);
-  for (double t60_s = low; t60_s < 1.01 * high; t60_s *= 10.0) {
-    const int digits = std::max(0, static_cast<int>(std::lround(-std::log10(t60_s))));
-    svg += line(left, y_of(t60_s), width - right, y_of(t60_s), grid_ink, "0.4") +
-           label(left - 6.0, y_of(t60_s) + 3.5,
-                 fixed(t60_s, digits) + (t60_s < high / 2.0 ? "" : " s"));
-  }
-  for (const IdentifiedMode& mode : found.modes) {
-    const double x = panel.x_of(mode.frequency_hz.value);
-    svg += line(x, panel.bottom(), x, y_of(mode.t60_s.value), mode_ink, "2");
-    svg += line(x, y_of(std::max(low, mode.t60_s.value - mode.t60_s.deviation)), x,
-                y_of(mode.t60_s.value + mode.t60_s.deviation), ink, "0.8");
-  }
-  return svg + box(left, panel.top, width - left - right, panel.height);
+  plot::Panel panel = spectrum_panel("T60 of each mode", 190.0, scale, {bars, deviations});
+  panel.y = {.title = "s",
+             .from = std::pow(10.0, std::floor(std::log10(0.7 * least))),
+             .to = std::pow(10.0, std::ceil(std::log10(1.1 * most))),
+             .is_logarithmic = true};
+  return panel;
 }
 
 }  // namespace
 
-std::string recording_picture(const Identification& found, const std::string& title) {
-  const double highest_hz = std::min(20000.0, 0.5 * found.rate_hz);
-  const Panel sound{.top = 44.0, .height = 240.0, .highest_hz = highest_hz};
-  const Panel decay{.top = 322.0, .height = 110.0, .highest_hz = highest_hz};
-  const Panel rest{.top = 470.0, .height = 160.0, .highest_hz = highest_hz};
-  const std::size_t frames = found.sound[0].size();
-  const std::size_t size = std::bit_ceil(frames);
+plot::Figure recording_figure(const Identification& found, const std::string& title) {
+  const std::size_t size = std::bit_ceil(found.sound[0].size());
   const std::vector<double> bins = magnitudes(found.sound, size);
-  const double reference = std::max(1e-30, *std::max_element(bins.begin(), bins.end()));
-  const auto panel_of = [&](const std::vector<double>& shown, const Panel& panel,
-                            const char* colour) {
-    return curve(shown, found.rate_hz, reference, panel, colour) + frequency_grid(panel) +
-           level_axis(panel);
-  };
-  const auto frame_of = [](const Panel& panel) {
-    return box(left, panel.top, width - left - right, panel.height);
-  };
-  return svg_head(width, 660.0, 11.0) + "<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n" +
-         "<text x=\"" + px(left) + "\" y=\"18\" font-size=\"14\">" + escaped(title) + ": " +
-         counted(found.modes.size(), "mode", "modes") + "</text>\n" +
-         label(left, 37.0, "spectrum of the recording, and of each mode its peak", "start") +
-         panel_of(bins, sound, sound_ink) + marks(found, frames, reference, sound) +
-         frame_of(sound) + frequency_axis(sound) +
-         label(left, decay.top - 7.0, "T60 of each mode, and how uncertain it is", "start") +
-         decays(found, decay) +
-         label(left, rest.top - 7.0,
-               "what the modes leave of it: " + fixed(found.residual_db, 1) + " dB", "start") +
-         panel_of(magnitudes(found.residual, size), rest, residual_ink) + frame_of(rest) +
-         frequency_axis(rest) + "</svg>\n";
+  const Scale scale{.rate_hz = found.rate_hz,
+                    .highest_hz = std::min(20000.0, 0.5 * found.rate_hz),
+                    .reference = std::max(1e-30, *std::max_element(bins.begin(), bins.end()))};
+  return {
+      .title = title + ": " + counted(found.modes.size(), "mode", "modes"),
+      .panel_width = 900.0,
+      .panels = {spectrum_panel("Spectrum of the recording, and the peak of each mode", 310.0,
+                                scale, {filled(bins, scale, "#777777"), peaks(found, scale)}),
+                 decay_panel(found, scale),
+                 spectrum_panel("Residual: " + fixed(found.residual_db, 1) + " dB", 230.0, scale,
+                                {filled(magnitudes(found.residual, size), scale, "#4a74a8")})}};
 }
 
 }  // namespace ressort::commands

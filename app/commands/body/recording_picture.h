@@ -1,15 +1,15 @@
-// app/commands: a picture of what was identified in a recording. Pure.
+// app/commands: a figure of the modes found in a recording. Pure.
 #pragma once
 
 #include <string>
 
-#include "app/rooms.h"
+#include "app/plot/plot.h"
 #include "core/identification/identify.h"
 
 namespace ressort::commands {
 
-// An SVG: the recording's spectrum with a mark for each mode where its own peak is, how long each
-// rings, and the spectrum of what the modes leave.
-std::string recording_picture(const Identification& found, const std::string& title);
+// Three panels over frequency: the spectrum of the recording with the peak of each mode, the T60 of
+// each mode with its standard deviation, and the spectrum of the residual.
+plot::Figure recording_figure(const Identification& found, const std::string& title);
 
 }  // namespace ressort::commands

@@ -78,11 +78,11 @@ std::string header(const Identification& found, const std::string& source) {
   for (const std::string& warning : found.warnings) {
     text += "# Warning: " + one_line(warning) + ".\n";
   }
-  text += "# A force of 1 at hit, for one sample, makes the amplitudes of the recording" +
-          std::string(channels == 1 ? " at mic" : "") +
-          ".\n# Behind each mode: how uncertain Hz and T60 are (standard deviations), its level "
-          "and how\n"
-          "# uncertain that is.\n";
+  text +=
+      "# A force of 1 at hit, for one sample, makes the amplitudes of the recording" +
+      std::string(channels == 1 ? " at mic" : "") +
+      ".\n# Comments of the modes: standard deviations of Hz and T60, the level and its standard\n"
+      "# deviation.\n";
   return text;
 }
 
@@ -98,7 +98,7 @@ std::string label_of_file(const std::string& path) {
   if (label.find_first_not_of('_') == label.npos) {
     return "body";
   }
-  // A word that names a port has in or out in it, and a label does not begin with a digit.
+  // Labels must not start with a digit, and in and out mark ports.
   return label[0] >= '0' && label[0] <= '9' ? "body_" + label : label;
 }
 

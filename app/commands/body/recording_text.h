@@ -1,4 +1,4 @@
-// app/commands: what was identified in a recording, as a model and for machines. Pure.
+// app/commands: the modes found in a recording, as a model and as JSON. Pure.
 #pragma once
 
 #include <string>
@@ -8,16 +8,16 @@
 
 namespace ressort::commands {
 
-// A label of the language out of a file's name: letters, digits and _; "body" if none is left.
+// Makes a label of a file name, from its letters, digits and _; "body" if none is left.
 std::string label_of_file(const std::string& path);
 
-// A body with the place `hit` and one for each channel: `mic`, `left` and `right`, or `mic1` and so
-// on; its modes, each with how uncertain it is; a force input and a position output for each
-// channel.
+// Returns a model of a body with the place `hit` and one place per channel (`mic`, `left` and
+// `right`, or `mic1` and so on), its modes with their standard deviations, a force input, and a
+// position output per channel.
 std::string body_model(const Identification& found, const std::string& label,
                        const std::string& source, double mass);
 
-// One object: modes, residual, warnings.
+// Returns modes, residual and warnings as one JSON object.
 std::string identification_json(const Identification& found, double mass);
 
 }  // namespace ressort::commands

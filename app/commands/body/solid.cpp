@@ -10,6 +10,7 @@
 
 #include "app/commands/body/shapes.h"
 #include "app/commands/progress_bar.h"
+#include "app/commands/put_figure.h"
 #include "app/exit_code.h"
 #include "app/realtime/lockfree.h"
 #include "app/session/files.h"
@@ -20,13 +21,13 @@ namespace ressort::commands {
 namespace {
 
 constexpr std::size_t max_solid_bytes = std::size_t{256} << 20;
-// Of the numbers in a model: 44100 steps a second, micrometres and newtons. What is struck by hand
-// then moves by about 1, and a kilogram is an M of 1944.81.
+// Units of the model: 44100 steps per second, micrometres and newtons. A strike by hand then moves
+// a body by about 1, and a kilogram is an M of 1944.81.
 constexpr double m_per_kg = 44100.0 * 44100.0 * 1e-6;
 constexpr int places_of_our_own = 4;
-constexpr double very_large = 20.0;  // m, of a thing that is struck
+constexpr double very_large = 20.0;  // m
 
-Flag called_off;  // by Ctrl-C, once: the second ends the program at once
+Flag called_off;  // by the first Ctrl-C; the second ends the process
 
 void watch_for_interrupt() {
   struct sigaction once {};
@@ -43,7 +44,7 @@ std::string lower(std::string text) {
   return text;
 }
 
-// A name of the language made of a file's.
+// Makes a label of a file name.
 std::string body_name(const std::string& file) {
   std::string name;
   for (const char c : std::filesystem::path(file).stem().string()) {
@@ -63,7 +64,7 @@ bool is_place_name(const std::string& name) {
          });
 }
 
-// So many numbers, divided by commas.
+// Parses N numbers, separated by commas.
 std::optional<std::vector<double>> numbers_of(const std::string& text) {
   std::vector<double> numbers;
   for (std::size_t from = 0; from <= text.size();) {
@@ -99,12 +100,13 @@ Result<MaterialChoice> choose_material(const SolidBodyOptions& options) {
       for (const SolidMaterial& row : solid_materials()) {
         names.emplace_back(row.name);
       }
-      return Error{"there is no material '" + options.material + "'" +
-                   did_you_mean(options.material, names) + "; there are " + joined(names, ", ")};
+      return Error{"unknown material '" + options.material + "'" +
+                   did_you_mean(options.material, names) + "; known are " + joined(names, ", ")};
     }
     material = *known;
   } else if (!options.young || !options.poisson || !options.density) {
-    return Error{"of what is it? --material NAME, or --young, --poisson and --density"};
+    return Error{
+        "the material is missing; pass --material NAME, or --young, --poisson and --density"};
   }
   material.young = options.young.value_or(material.young);
   material.poisson = options.poisson.value_or(material.poisson);
@@ -120,7 +122,7 @@ Result<MaterialChoice> choose_material(const SolidBodyOptions& options) {
   if (damping.a < 0.0 || damping.b < 0.0 || damping.loss < 0.0 ||
       damping.a + damping.b + damping.loss <= 0.0) {
     return Error{
-        "--loss must be above 0; the numbers of --rayleigh not below, and one of them above"};
+        "--loss must be above 0; the numbers of --rayleigh must not be negative, nor both 0"};
   }
   return MaterialChoice{material, damping};
 }
@@ -130,7 +132,7 @@ Result<ClosedSurface> read_solid(const SolidBodyOptions& options, const Progress
   if (!bytes) {
     return bytes.error();
   }
-  progress.stage("reading it");
+  progress.stage("reading the solid");
   const bool is_obj = lower(options.input).ends_with(".obj");
   const auto surface = is_obj ? read_obj(*bytes) : read_stl(*bytes);
   const auto located = [&](const Error& error) {
@@ -157,7 +159,7 @@ Result<std::vector<SolidPlace>> choose_places(const SolidBodyOptions& options,
     const int node = nearest_on_surface(mesh, options.scale * picked.point);
     const Point3 direction = picked.direction.value_or(normals[static_cast<std::size_t>(node)]);
     if (is_clamped(mesh.points[static_cast<std::size_t>(node)], clamps)) {
-      return Error{"--place " + picked.name + " is clamped: it never moves"};
+      return Error{"--place " + picked.name + " is clamped and cannot move"};
     }
     if (!(length(direction) > 0.0)) {
       return Error{"--place " + picked.name + ": the direction must not be 0"};
@@ -166,7 +168,7 @@ Result<std::vector<SolidPlace>> choose_places(const SolidBodyOptions& options,
       return other.name == picked.name;
     });
     if (is_taken) {
-      return Error{"--place " + picked.name + " is there twice"};
+      return Error{"--place " + picked.name + " is defined twice"};
     }
     places.push_back({picked.name, node, 1.0 / length(direction) * direction});
   }
@@ -179,8 +181,8 @@ Result<std::vector<SolidPlace>> choose_places(const SolidBodyOptions& options,
   return places;
 }
 
-// In the language. M of all modes is the body's mass; a place moves by 1 where the body as a whole
-// moves by 1.
+// Writes the body as a model. M of all modes is the mass of the body; weights are relative to a
+// motion of the whole body.
 std::string body_text(const std::string& name, const std::string& story, const SolidMesh& mesh,
                       const SolidModes& modes, const std::vector<SolidPlace>& places,
                       const SolidDamping& damping) {
@@ -232,11 +234,11 @@ std::string story_of(const SolidBodyOptions& options, const MaterialChoice& choi
          ".\n# Finite elements: " + std::to_string(mesh.elements.size()) +
          " quadratic tetrahedra by " + by + ", " + std::to_string(mesh.unknowns()) +
          " unknowns, residual " + digits(modes.residual, 2) +
-         ".\n# Positions are in micrometres and forces in newtons: M is kilograms times 1e-6 "
-         "(44100/s)^2, "
-         "and a\n# spring's K newtons per micrometre. A mode: its frequency in Hz, its T60 in "
-         "seconds, "
-         "and how far each\n# place moves, which is 1 where the body moves by 1 as a whole.\n";
+         ".\n# Units: micrometres and newtons; M is kilograms times 1e-6 (44100/s)^2, and K "
+         "newtons per\n"
+         "# micrometre. A mode has its frequency in Hz, its T60 in s, and the displacement of each "
+         "place\n"
+         "# relative to a motion of the whole body.\n";
 }
 
 }  // namespace
@@ -304,10 +306,10 @@ int solid_body(const SolidBodyOptions& options) {
     return !called_off.is_raised();
   };
   const Progress progress([&](std::string_view stage) {
-    share = stage == "finding its modes" ? 0.6 : stage == "reading it" ? 0.0 : 0.3;
+    share = stage == "finding its modes" ? 0.6 : stage == "reading the solid" ? 0.0 : 0.3;
     return goes_on(stage);
   });
-  // What went wrong, or that it was called off: then nothing was written.
+  // Reports an error or the interruption. Nothing has been written then.
   const auto failed = [&](const Error& error) {
     if (error.message == stopped) {
       std::fprintf(stderr, "%s: interrupted\n", options.input.c_str());
@@ -322,12 +324,12 @@ int solid_body(const SolidBodyOptions& options) {
     }
     const Box3 box = box_around(closed->surface.points);
     if (box.diagonal() > very_large) {
-      complain("warning: it is " + digits(box.diagonal(), 3) +
-               " m large; if the file is in millimetres, say --scale 0.001");
+      complain("warning: the solid is " + digits(box.diagonal(), 3) +
+               " m large; for a file in millimetres, pass --scale 0.001");
     }
     share = 0.1;
-    const auto meshed = fill_with_tetrahedra(*closed, options.mesh,
-                                             [&] { return goes_on("filling it with tetrahedra"); });
+    const auto meshed =
+        fill_with_tetrahedra(*closed, options.mesh, [&] { return goes_on("meshing"); });
     if (!meshed) {
       return failed(Error{meshed.error().message == stopped
                               ? stopped
@@ -355,8 +357,8 @@ int solid_body(const SolidBodyOptions& options) {
     if (!options.picture.empty()) {
       const std::string title = std::filesystem::path(options.input).filename().string() + ", " +
                                 digits(modes->mass, 4) + " kg";
-      if (const int failure = put_text(
-              options.picture, shapes_picture(*mesh, *modes, *places, title), options.force)) {
+      if (const int failure = put_figure(
+              options.picture, shapes_figure(*mesh, *modes, *places, title), options.force)) {
         return failure;
       }
     }

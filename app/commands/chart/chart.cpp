@@ -1,8 +1,9 @@
 #include "app/commands/chart/chart.h"
 
-#include <unistd.h>
+#include <sched.h>
 
 #include <algorithm>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <cstring>
@@ -10,8 +11,10 @@
 #include <filesystem>
 #include <fstream>
 
-#include "app/commands/chart/picture/picture.h"
-#include "app/commands/chart/start.h"
+#include "app/commands/chart/judge.h"
+#include "app/commands/chart/picture.h"
+#include "app/commands/progress_bar.h"
+#include "app/commands/put_figure.h"
 #include "app/exit_code.h"
 #include "app/realtime/lockfree.h"
 #include "app/session/files.h"
@@ -21,89 +24,84 @@
 namespace ressort::commands {
 namespace {
 
+constexpr std::size_t stretch = 441;  // output samples that are timed at once
+constexpr int least_rounds = 3;
+constexpr int most_rounds = 100;
+
 Flag interrupted;  // by Ctrl-C
 
-using Tells = std::function<bool(const std::string&)>;
+using ReportProgress = std::function<bool(const std::string&)>;
 
 void complain(const std::string& text) {
   std::fprintf(stderr, "%s\n", text.c_str());
 }
 
-std::string processor() {
-  std::ifstream file("/proc/cpuinfo");
-  for (std::string line; std::getline(file, line);) {
-    if (line.starts_with("model name")) {
-      return line.substr(line.find(':') + 2);
-    }
-  }
-  return "a processor without a name";
-}
-
-Provenance provenance() {
+// Program, date and processor, for the caption of the figures.
+std::string provenance() {
   const std::time_t now = std::time(nullptr);
   char date[16] = "";
   std::tm local{};
   if (localtime_r(&now, &local) != nullptr) {
     std::strftime(date, sizeof date, "%Y-%m-%d", &local);
   }
-#ifdef __clang__
-  const std::string compiler = std::string("clang ") + __clang_version__;
-#else
-  const std::string compiler = std::string("g++ ") + __VERSION__;
-#endif
-  return {.processor = processor(),
-          .compiler = compiler,
-          .date = date,
-          .program = std::string("ressort ") + version + " (" + commit + ")"};
+  std::string processor = "an unknown processor";
+  std::ifstream file("/proc/cpuinfo");
+  for (std::string line; std::getline(file, line);) {
+    if (line.starts_with("model name")) {
+      processor = line.substr(line.find(':') + 2);
+      break;
+    }
+  }
+  return std::string("ressort ") + version + " (" + commit + "), " + date + ", " + processor;
 }
 
-// A way and what it plays.
-struct Heard {
+// --- playing -------------------------------------------------------------------------------------
+
+// A method and its sound.
+struct PlayedWay {
   MadeWay made;
   Waves waves;
 };
 
-// Does any output move, as the published scheme has it?
+// Whether any output of the published scheme moves.
 bool sounds(const ChartScene& scene, Isa isa) {
   auto made = make_way(scene, {.name = "direct", .method = Method::direct}, heard_s, isa);
   if (!made) {
-    return true;  // the one to say why is whoever plays it
+    return true;  // the reference will report the reason
   }
-  const Waves waves = render_way(*made, static_cast<std::size_t>(heard_s * 44100.0));
+  const Waves waves = render_way(*made, static_cast<std::size_t>(heard_s * scene_rate_hz));
   return std::any_of(waves.begin(), waves.end(), [](const std::vector<double>& wave) {
     return std::any_of(wave.begin(), wave.end(), [&](double y) { return y != wave[0]; });
   });
 }
 
-// Bit by bit: what is no number is the same too.
-bool is_same(const Waves& a, const Waves& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const auto& x, const auto& y) {
-    return x.size() == y.size() && std::memcmp(x.data(), y.data(), x.size() * sizeof(double)) == 0;
-  });
+// Compares bit by bit, so that NaN equals NaN.
+bool is_same(const PlayedWay& a, const PlayedWay& b) {
+  return a.made.way.precision == b.made.way.precision && a.made.methods == b.made.methods &&
+         std::equal(a.waves.begin(), a.waves.end(), b.waves.begin(), b.waves.end(),
+                    [](const auto& x, const auto& y) {
+                      return x.size() == y.size() &&
+                             std::memcmp(x.data(), y.data(), x.size() * sizeof(double)) == 0;
+                    });
 }
 
-bool is_same(const Heard& a, const Heard& b) {
-  return a.made.way.precision == b.made.way.precision &&
-         same_kind(a.made.machine(), b.made.machine()) && is_same(a.waves, b.waves);
-}
-
-// All ways that can, and each kind of bits only once.
-std::vector<Heard> hear_all(const Starts& starts, Isa isa, const Tells& tells) {
-  std::vector<Heard> all;
+// Plays all methods that can play the scene. Methods with equal output become one.
+std::vector<PlayedWay> play_all(const Starts& starts, Isa isa, const ReportProgress& progress) {
+  std::vector<PlayedWay> all;
   for (const Way& way : all_ways()) {
-    if (!tells(way.name + ", " + precision_name(way.precision))) {
+    if (!progress("playing " + way.name + ", " + precision_name(way.precision))) {
       return {};
     }
     auto made = make_way(starts.at(way.oversampling), way, heard_s, isa);
     if (!made) {
       continue;
     }
-    Heard heard{.made = *std::move(made), .waves = {}};
-    heard.waves = render_way(heard.made, static_cast<std::size_t>(heard_s * 44100.0));
+    PlayedWay played{.made = *std::move(made), .waves = {}};
+    played.waves = render_way(played.made, static_cast<std::size_t>(heard_s * scene_rate_hz));
     const auto twin = std::find_if(all.begin(), all.end(),
-                                   [&](const Heard& other) { return is_same(other, heard); });
+                                   [&](const PlayedWay& other) { return is_same(other, played); });
     if (twin == all.end()) {
-      all.push_back(std::move(heard));
+      all.push_back(std::move(played));
     } else {
       twin->made.twins.push_back(way.name);
     }
@@ -111,89 +109,107 @@ std::vector<Heard> hear_all(const Starts& starts, Isa isa, const Tells& tells) {
   return all;
 }
 
-// Runs gnuplot over the script in its folder; false where there is none.
-bool draw(const std::string& folder) {
-  const std::filesystem::path before = std::filesystem::current_path();
-  std::filesystem::current_path(folder);
-  FILE* const gnuplot = popen("gnuplot chart.gp", "r");
-  const bool is_drawn = gnuplot != nullptr && pclose(gnuplot) == 0;
-  std::filesystem::current_path(before);
-  return is_drawn;
+// --- timing --------------------------------------------------------------------------------------
+
+double cpu_ns() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return 1e9 * static_cast<double>(now.tv_sec) + static_cast<double>(now.tv_nsec);
 }
 
-bool has_gnuplot() {
-  FILE* const gnuplot = popen("gnuplot --version 2>/dev/null", "r");
-  if (gnuplot == nullptr) {
-    return false;
-  }
-  char text[64];
-  const bool answers = std::fgets(text, sizeof text, gnuplot) != nullptr;
-  return pclose(gnuplot) == 0 && answers;
+// Pins this thread to its current core.
+void stay_on_one_core() {
+  cpu_set_t cores;
+  CPU_ZERO(&cores);
+  CPU_SET(static_cast<std::size_t>(std::max(0, sched_getcpu())), &cores);
+  sched_setaffinity(0, sizeof cores, &cores);
 }
 
-// What goes on, in one line that is written over on a terminal.
-class ProgressLine {
- public:
-  bool tell(const std::string& scene, const std::string& text) {
-    if (shows_) {
-      std::fprintf(stderr, "\r\033[K%s: %s", scene.c_str(), text.c_str());
-    } else if (scene != scene_) {
-      std::fprintf(stderr, "%s\n", scene.c_str());
-    }
-    scene_ = scene;
-    return !interrupted.is_raised();
-  }
-  void end() const {
-    if (shows_) {
-      std::fprintf(stderr, "\r\033[K");
+// Plays every method once and keeps the shortest time of each stretch. Returns what it took.
+double time_round(std::vector<MadeWay>& ways, std::vector<std::vector<double>>& shortest_ns,
+                  const std::function<bool()>& stops) {
+  const double start = cpu_ns();
+  for (std::size_t i = 0; i < ways.size() && !stops(); ++i) {
+    ways[i].player->rewind();
+    for (double& kept : shortest_ns[i]) {
+      const double before = cpu_ns();
+      ways[i].player->play(stretch * ways[i].way.oversampling, nullptr);
+      kept = std::min(kept, cpu_ns() - before);
     }
   }
+  return cpu_ns() - start;
+}
 
- private:
-  bool shows_ = isatty(STDERR_FILENO) != 0;
-  std::string scene_;
-};
+// Times the methods in turns over the beginning of the scene, as much of it as `patience_s` allows.
+// Returns nanoseconds per output sample, [way]; empty if it was stopped.
+std::vector<double> time_ways(std::vector<MadeWay>& ways, double patience_s,
+                              const std::function<bool()>& stops) {
+  constexpr double short_s = 0.03;
+  std::vector<std::vector<double>> shortest_ns(ways.size());
+  const auto start_over = [&](double seconds) {
+    const auto count = static_cast<std::size_t>(seconds * scene_rate_hz) / stretch;
+    for (std::vector<double>& one : shortest_ns) {
+      one.assign(count, HUGE_VAL);
+    }
+  };
+  start_over(short_s);
+  const double short_ns = time_round(ways, shortest_ns, stops);
+  start_over(std::clamp(short_s * 1e9 * patience_s / (least_rounds * short_ns), short_s, heard_s));
+  double spent_ns = 0.0;
+  for (int round = 0;
+       !stops() && round < most_rounds && (round < least_rounds || spent_ns < 1e9 * patience_s);
+       ++round) {
+    spent_ns += time_round(ways, shortest_ns, stops);
+  }
+  std::vector<double> ns;
+  for (const std::vector<double>& one : shortest_ns) {
+    double sum = 0.0;
+    for (const double stretch_ns : one) {
+      sum += stretch_ns;
+    }
+    ns.push_back(sum / static_cast<double>(one.size() * stretch));
+  }
+  return stops() ? std::vector<double>() : ns;
+}
 
 int write_all(const ChartOptions& options, const std::vector<ChartSheet>& sheets) {
-  const Provenance made = provenance();
   const std::filesystem::path folder = options.folder;
-  for (const auto& [name, text] :
-       {std::pair(std::string("chart.csv"), chart_csv(sheets, made)),
-        std::pair(std::string("chart.gp"), chart_script(sheets, made))}) {
-    if (const auto written = write_text((folder / name).string(), text, Existing::replace);
-        !written) {
-      complain(written.error().message);
-      return exit_code::wrong_use;
-    }
+  const std::string made_by = provenance();
+  const bool is_forced = true;
+  if (const int code =
+          put_text((folder / "chart.csv").string(), chart_csv(sheets, made_by), is_forced)) {
+    return code;
   }
   std::printf("%s: %s\n", (folder / "chart.csv").c_str(),
               counted(sheets.size(), "scene", "scenes").c_str());
-  if (!has_gnuplot()) {
-    complain(
-        "no pictures: gnuplot is not installed (Debian: apt install gnuplot-nox); then run "
-        "'gnuplot chart.gp' in " +
-        options.folder);
+  if (const auto found = plot::check_gnuplot(); !found) {
+    complain("no figures: " + found.error().message);
     return exit_code::done;
   }
-  if (!draw(options.folder)) {
-    complain("gnuplot failed on " + (folder / "chart.gp").string());
-    return exit_code::our_failure;
+  for (const ChartSheet& sheet : sheets) {
+    const std::string path = (folder / (sheet.scene + ".svg")).string();
+    if (const int code = put_figure(path, sheet_figure(sheet, made_by), is_forced)) {
+      return code;
+    }
   }
-  std::printf("%s: overview.png, overview.svg and one of each for every scene\n",
-              options.folder.c_str());
-  return exit_code::done;
+  const std::string overview = (folder / "overview.svg").string();
+  const int code = put_figure(overview, overview_figure(sheets, made_by), is_forced);
+  if (code == exit_code::done) {
+    std::printf("%s: all scenes; SCENE.svg beside it has one\n", overview.c_str());
+  }
+  return code;
 }
 
 }  // namespace
 
 Result<ChartSheet> make_sheet(const ChartScene& asked, Isa isa, double patience_s,
-                              const Tells& tells) {
+                              const ReportProgress& progress) {
   const ChartScene scene = sounds(asked, isa) ? asked : struck(asked);
   if (!sounds(scene, isa)) {
     return Error{scene.name + ": no output moves, even when it is struck"};
   }
-  ChartSheet sheet{.scene = scene.name, .about = scene.about, .is_linear = scene.is_linear};
-  if (!tells("the reference")) {
+  ChartSheet sheet{.scene = scene.name, .about = scene.about};
+  if (!progress("computing the reference")) {
     return sheet;
   }
   const Starts starts(scene);
@@ -201,39 +217,29 @@ Result<ChartSheet> make_sheet(const ChartScene& asked, Isa isa, double patience_
   if (!references) {
     return Error{scene.name + ": " + references.error().message};
   }
-  sheet.reference[0] = references->identical.how;
-  sheet.reference[1] = references->physical.how;
-  sheet.is_linear = references->continuous.has_value();
-  sheet.floor_db = references->physical.floor_db;
-  sheet.window = references->window;
-  std::vector<Heard> all = hear_all(starts, isa, tells);
-  Poles published;
-  if (references->continuous && !all.empty()) {
-    published = poles_of(scene, *references->continuous, all[0].made);
+  sheet.reference = references->how;
+  sheet.window_s = references->window_s;
+  if (!references->is_exact) {
+    sheet.floor_db = references->floor_db;
   }
+  std::vector<PlayedWay> all = play_all(starts, isa, progress);
   const Stress stress(scene, isa);
   std::vector<MadeWay> ways;
-  for (Heard& heard : all) {
-    if (!tells("judging " + heard.made.way.name)) {
+  for (PlayedWay& played : all) {
+    const Way& way = played.made.way;
+    if (!progress("testing the stability of " + way.name)) {
       return ChartSheet{};
     }
-    ChartRow row{.way = heard.made.way,
-                 .methods = heard.made.methods,
-                 .twins = heard.made.twins,
-                 .predicted_ns = heard.made.predicted_ns(),
-                 .judged = judge(scene, *references, published, heard.made, heard.waves)};
-    row.failure = !row.judged.is_finite ? "out of all bounds" : stress.verdict(row.way);
-    heard.waves = {};
-    ways.push_back(std::move(heard.made));
+    ChartRow row{.way = way, .methods = played.made.methods, .twins = played.made.twins};
+    row.snr_db = references->snr_db(played.waves);
+    row.failure = stress.verdict(way);
+    ways.push_back(std::move(played.made));
     sheet.rows.push_back(std::move(row));
   }
-  if (patience_s > 0.0 && tells("timing " + counted(ways.size(), "way", "ways"))) {
-    const Timing timing = time_ways(ways, patience_s, [&] { return !tells("timing"); });
-    sheet.timed_s = timing.seconds;
-    sheet.rounds = timing.rounds;
-    for (std::size_t i = 0; i < ways.size() && timing.rounds > 0; ++i) {
-      sheet.rows[i].ns = timing.ns[i];
-      sheet.rows[i].upper_ns = timing.upper_ns[i];
+  if (patience_s > 0.0 && progress("timing " + counted(ways.size(), "method", "methods"))) {
+    const std::vector<double> ns = time_ways(ways, patience_s, [&] { return !progress("timing"); });
+    for (std::size_t i = 0; i < ns.size(); ++i) {
+      sheet.rows[i].ns = ns[i];
     }
   }
   find_fronts(sheet);
@@ -245,7 +251,7 @@ int chart(const ChartOptions& options) {
   std::error_code error;
   std::filesystem::create_directories(options.folder, error);
   if (error) {
-    complain("the folder '" + options.folder + "' cannot be made: " + error.message());
+    complain("cannot create the folder '" + options.folder + "': " + error.message());
     return exit_code::wrong_use;
   }
   std::vector<ChartScene> scenes;
@@ -258,25 +264,25 @@ int chart(const ChartOptions& options) {
     scenes.push_back(*std::move(scene));
   }
   stay_on_one_core();
-  ProgressLine progress;
   std::vector<ChartSheet> sheets;
-  for (const ChartScene& scene : scenes) {
-    auto sheet = make_sheet(scene, best_isa(), options.patience_s, [&](const std::string& text) {
-      return progress.tell(scene.name, text);
-    });
+  for (std::size_t i = 0; i < scenes.size() && !interrupted.is_raised(); ++i) {
+    ProgressBar bar(true);
+    auto sheet =
+        make_sheet(scenes[i], best_isa(), options.patience_s, [&](const std::string& text) {
+          bar.show(static_cast<double>(i) / static_cast<double>(scenes.size()),
+                   scenes[i].name + ": " + text);
+          return !interrupted.is_raised();
+        });
     if (!sheet) {
-      progress.end();
       complain(sheet.error().message);
       return exit_code::wrong_use;
     }
-    if (interrupted.is_raised()) {
-      break;
+    if (!interrupted.is_raised()) {
+      sheets.push_back(*std::move(sheet));
     }
-    sheets.push_back(*std::move(sheet));
   }
-  progress.end();
   if (interrupted.is_raised()) {
-    complain("interrupted; what is complete is written");
+    complain("interrupted; the finished scenes are written");
   }
   const int code = sheets.empty() ? exit_code::our_failure : write_all(options, sheets);
   return interrupted.is_raised() ? exit_code::our_failure : code;

@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t most_kept = std::size_t{1} << 22;  // samples of a motion
 
-// Where one input is at every sample.
+// Position of one input at every sample, computed in advance so that timing excludes it.
 class InputTrack {
  public:
   InputTrack(InputMotion motion, double start, double rate_hz, double seconds)
@@ -34,7 +34,7 @@ class InputTrack {
   std::vector<double> kept_;
 };
 
-// One part's kernel and what it is fed with.
+// One part's kernel with the buffers of its inputs and outputs.
 template <class T>
 struct PlayedPart {
   PlayedPart(const Program& program_in, Isa isa)
@@ -67,7 +67,7 @@ struct PlayedPart {
   Aligned<T> value;  // [frame][input][lane]
   Aligned<T> velocity;
   Aligned<T> outputs;          // [frame][output][lane]
-  std::vector<double> before;  // [input] where it was
+  std::vector<double> before;  // [input] previous position
 };
 
 template <class T>
@@ -95,16 +95,16 @@ class KernelPlayer final : public ChartPlayer {
         part.kernel->reset(lane);
       }
     }
-    start_inputs();
-  }
-
-  void place(const States& x, const States& v) override {
-    for (std::size_t i = 0; i < parts_.size(); ++i) {
-      for (std::size_t lane = 0; lane < parts_[i].lanes; ++lane) {
-        parts_[i].kernel->set_state(lane, x[i].data(), v[i].data());
+    frame_ = 0;
+    for (PlayedPart<T>& part : parts_) {
+      for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {
+        const InputTrack& track = tracks_[part.program.inputs[i].input];
+        part.before[i] = track.start();
+        for (std::size_t n = 0; n < max_block_frames; ++n) {
+          part.feed(n, i, track.start(), 0.0);
+        }
       }
     }
-    start_inputs();
   }
 
   void play(std::size_t frames, double* outputs) override {
@@ -144,19 +144,6 @@ class KernelPlayer final : public ChartPlayer {
   }
 
  private:
-  void start_inputs() {
-    frame_ = 0;
-    for (PlayedPart<T>& part : parts_) {
-      for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {
-        const InputTrack& track = tracks_[part.program.inputs[i].input];
-        part.before[i] = track.start();
-        for (std::size_t n = 0; n < max_block_frames; ++n) {
-          part.feed(n, i, track.start(), 0.0);
-        }
-      }
-    }
-  }
-
   void feed(PlayedPart<T>& part, std::size_t count) {
     for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {
       const InputTrack& track = tracks_[part.program.inputs[i].input];

@@ -1,5 +1,5 @@
-// app/commands: plays a machine's kernels alone, one voice, with inputs whose motion is a function
-// of time.
+// app/commands: plays the kernels of a machine without the engine: one voice, with inputs that move
+// as functions of time.
 #pragma once
 
 #include <memory>
@@ -18,19 +18,16 @@ class ChartPlayer {
  public:
   virtual ~ChartPlayer() = default;
 
-  // To where the machine starts, at time 0.
+  // Returns to the start.
   virtual void rewind() = 0;
-  // To any other state, the inputs where they start.
-  virtual void place(const States& x, const States& v) = 0;
-  // The next `frames` samples of the machine's own rate; [frame][channel] to `outputs`, if it is
-  // not null.
+  // Plays `frames` samples of the machine's own rate; writes [frame][channel] to `outputs` unless
+  // it is null.
   virtual void play(std::size_t frames, double* outputs) = 0;
-  // Where every node is, and how fast; false where a kernel does not know.
+  // Copies all positions and velocities. Returns false where a kernel does not know them.
   virtual bool save(States& x, States& v) const = 0;
 };
 
-// With the motion of the machine's inputs, known beforehand for `seconds`: what is played later is
-// right too, but slower.
+// Computes the motion of the inputs in advance for `seconds`; later samples are correct but slower.
 std::unique_ptr<ChartPlayer> make_player(const Machine& machine,
                                          const std::vector<InputMotion>& motions, double seconds,
                                          Precision precision, Isa isa);

@@ -1,6 +1,7 @@
 #include "app/commands/chart/scenes.h"
 
 #include <algorithm>
+#include <bit>
 #include <cctype>
 #include <cmath>
 #include <set>
@@ -17,8 +18,8 @@ namespace {
 
 constexpr double velocity = 0.8;      // of the note
 constexpr double blow = 0.01;         // per sample: x[-1] = x[0] - blow
-constexpr double bow_start_s = 0.01;  // a bow's speed is reached as by a one-pole filter
-constexpr double reach_s = 0.005;     // the same of an input that goes somewhere
+constexpr double bow_start_s = 0.01;  // time constant of a bow that gets up to speed
+constexpr double reach_s = 0.005;     // time constant of an input that moves to a position
 constexpr double harder = 10.0;
 
 Network parsed(const std::string& text) {
@@ -34,7 +35,7 @@ std::uint32_t mass_called(const Network& network, const std::string& name) {
   return 0;
 }
 
-// N masses between two grounds, pushed and heard at masses that are counted from 0.
+// A string between two grounds. `in` and `out` count the masses from 0.
 Network string_of(std::uint32_t masses, double k, double z, std::uint32_t in, std::uint32_t out) {
   Network network = *generate({.kind = ShapeKind::string,
                                .length = masses + 2,
@@ -100,7 +101,7 @@ double value_of(const ControlSetting& control) {
                              : control.low + velocity * (control.high - control.low);
 }
 
-// What a note does to an input that rests at `middle`.
+// The motion by which a note plays an input that rests at `middle`.
 InputMotion motion_of(const ControlSetting& control, double middle) {
   const double value = value_of(control);
   switch (control.gesture) {
@@ -135,10 +136,10 @@ void strike(ChartScene& scene, std::uint32_t mass) {
   struck.third = scene.network.third == ThirdArgument::delayed_position
                      ? struck.position - blow
                      : struck.third + blow * scene_rate_hz;
-  scene.about = "an impulse at one mass, x[-1] = x[0] - 0.01";
+  scene.about = "an impulse at one mass";
 }
 
-// The mass that an input pushes, or that the first link ties to it.
+// Returns the mass that an input drives: its own, or the one that the first link ties to it.
 std::uint32_t struck_by(const Network& network, const Input& input) {
   if (input.is_force) {
     return input.mass;
@@ -189,7 +190,7 @@ void play_note(ChartScene& scene, const Preset& preset) {
         strike(scene, struck_by(scene.network, input));
       } else if (control.gesture != Gesture::parameter) {
         scene.motions[i] = motion_of(control, scene.network.masses[input.mass].position);
-        scene.about = word_of(control.gesture) + " as by a note of velocity 0.8";
+        scene.about = word_of(control.gesture) + ", a note of velocity 0.8";
       }
     }
   }
@@ -200,7 +201,7 @@ void excite(ChartScene& scene, const Preset& preset) {
   scene.is_linear = is_linear(scene.network);
   scene.has_contacts = has_contacts(scene.network);
   if (!is_still(scene.network)) {
-    scene.about = "as it starts";
+    scene.about = "released from its initial state";
   } else if (scene.is_linear) {
     strike_first_mass(scene);
   } else {
@@ -211,30 +212,7 @@ void excite(ChartScene& scene, const Preset& preset) {
   }
 }
 
-// Masses light, all else at the upper end.
-std::vector<double> worst_of(const Network& network, const Preset& preset) {
-  std::vector<double> worst = parameter_values(network);
-  for (std::size_t p = 0; p < network.parameters.size(); ++p) {
-    const bool is_mass =
-        std::any_of(network.masses.begin(), network.masses.end(), [&](const Mass& mass) {
-          if (mass.mass == no_argument) {
-            return false;
-          }
-          const Formula& formula = network.arguments[mass.mass];
-          return std::any_of(formula.begin(), formula.end(), [&](const Step& step) {
-            return step.op == Op::parameter && step.index == p;
-          });
-        });
-    for (const ParameterSetting& setting : preset.parameters) {
-      if (setting.name == network.parameters[p].name) {
-        worst[p] = is_mass ? setting.minimum : setting.maximum;
-      }
-    }
-  }
-  return worst;
-}
-
-// As a file may be called.
+// Replaces characters that a file name should not have.
 std::string plain(std::string name) {
   std::replace_if(
       name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) == 0 && c != '-'; },
@@ -247,7 +225,7 @@ Result<ChartScene> scene_of(const std::string& name, Network network, const Pres
   const auto heard = std::any_of(scene.network.parameters.begin(), scene.network.parameters.end(),
                                  [](const Parameter& p) { return p.audio_input > 0; });
   if (heard) {
-    return Error{name + ": a parameter is an audio input, which the chart cannot play"};
+    return Error{name + ": the chart cannot play audio inputs of parameters"};
   }
   if (scene.network.outputs.empty()) {
     return Error{name + ": the model has no output"};
@@ -257,7 +235,6 @@ Result<ChartScene> scene_of(const std::string& name, Network network, const Pres
       parameter.value = setting.name == parameter.name ? setting.value : parameter.value;
     }
   }
-  scene.worst = worst_of(scene.network, preset);
   excite(scene, preset);
   return scene;
 }
@@ -312,8 +289,7 @@ ChartScene struck(const ChartScene& scene) {
   for (const std::uint32_t mass : masses) {
     strike(other, mass);
   }
-  other.about = std::string("nothing sounds by itself, so: an impulse at ") +
-                (masses.empty() ? "the first mass" : "its inputs") + ", x[-1] = x[0] - 0.01";
+  other.about = std::string("an impulse at ") + (masses.empty() ? "the first mass" : "its inputs");
   return other;
 }
 
@@ -334,6 +310,37 @@ ChartScene struck_harder(const ChartScene& scene) {
     }
   }
   return hard;
+}
+
+Starts::Starts(const ChartScene& scene) {
+  scenes_.fill(scene);
+  if (!scene.is_linear) {
+    return;
+  }
+  Network heard = scene.network;  // with an output at every mass that moves
+  heard.outputs.clear();
+  for (std::uint32_t i = 0; i < heard.masses.size(); ++i) {
+    if (moves(heard.masses[i])) {
+      heard.outputs.push_back({.number = static_cast<int>(heard.outputs.size()) + 1, .mass = i});
+    }
+  }
+  const auto course = solve_continuous(heard, parameter_values(heard));
+  for (unsigned i = 0; i < scenes_.size() && course; ++i) {
+    const double steps = 1U << i;
+    Network& network = scenes_[i].network;
+    for (std::size_t o = 0; o < heard.outputs.size(); ++o) {
+      Mass& mass = network.masses[heard.outputs[o].mass];
+      // No link pulls in the first step, which therefore ends where the continuous network is then.
+      const double way = steps * (course->play(o, 1, 1.0 / steps)[0] - mass.position);
+      mass.third = network.third == ThirdArgument::delayed_position
+                       ? mass.position - way
+                       : way * Network::reference_rate_hz;
+    }
+  }
+}
+
+const ChartScene& Starts::at(unsigned steps_a_sample) const {
+  return scenes_[static_cast<std::size_t>(std::countr_zero(steps_a_sample))];
 }
 
 }  // namespace ressort::commands

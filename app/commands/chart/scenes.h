@@ -1,7 +1,8 @@
-// app/commands: what the chart is drawn of. A scene is a network and what drives its inputs, told
-// in seconds, so that it is the same at every rate.
+// app/commands: the scenes of the chart. A scene is a network and the motions of its inputs as
+// functions of seconds, so that it is the same at every rate.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <string>
 #include <vector>
@@ -12,37 +13,47 @@
 
 namespace ressort::commands {
 
-// The rate that scenes' numbers are written for.
+// The rate of the scenes' coefficients.
 inline constexpr double scene_rate_hz = Network::reference_rate_hz;
 
-// Where an input is at a time in seconds.
+// Position of an input at a time in seconds.
 using InputMotion = std::function<double(double)>;
 
 struct ChartScene {
   std::string name;
-  std::string about;                 // how it is excited, for people
-  Network network;                   // without macros; its parameters as the preset has them
-  std::vector<InputMotion> motions;  // [input] null where it stays, as forces do
-  bool is_linear = false;            // the continuous network is known exactly
-  bool has_contacts = false;         // what is chaotic: waveforms count for some milliseconds only
-  std::vector<double> worst;  // [parameter] at the ends of their ranges: stiff, damped, light
+  std::string about;                 // the excitation, for people
+  Network network;                   // without macros, with the preset's parameters
+  std::vector<InputMotion> motions;  // [input] null for inputs at rest and for forces
+  bool is_linear = false;            // the continuous network has an exact solution
+  bool has_contacts = false;
 
-  bool is_driven() const;  // energy comes in by an input
+  bool is_driven() const;  // an input moves
 };
 
-// The reference scenes' names.
+// Names of the reference scenes.
 const std::vector<std::string>& reference_scenes();
 
-// A reference scene, or else a model or a preset by file or name. Linear networks that rest get
-// x[-1] = x[0] - 0.01 on their first input's mass, all others the gesture that a note of velocity
-// 0.8 is to their preset, at the pitch that is written.
+// Returns a reference scene, or a model or a preset by file or name. A linear network at rest
+// starts with x[-1] = x[0] - 0.01 at its first input's mass; others play the gesture of a note of
+// velocity 0.8 at the pitch that is written.
 Result<ChartScene> chart_scene(const std::string& name);
 
-// The same with an impulse besides, at the mass of every input or else at the first one that moves:
-// for networks in which nothing sounds as they are.
+// Adds an impulse at the mass of every input, or else at the first mass that moves.
 ChartScene struck(const ChartScene& scene);
 
-// The same, hit ten times harder: start and motions.
+// Makes the start and the motions ten times harder.
 ChartScene struck_harder(const ChartScene& scene);
+
+// A scheme knows the velocity of a mass only by its position after the first step. Each length of a
+// step therefore has a scene of its own, in which the masses start towards the position of the
+// continuous network after one step. Scenes that are nonlinear or too large stay as they are.
+class Starts {
+ public:
+  explicit Starts(const ChartScene& scene);             // [control] seconds for a thousand masses
+  const ChartScene& at(unsigned steps_a_sample) const;  // 1, 2, 4 or 8
+
+ private:
+  std::array<ChartScene, 4> scenes_;
+};
 
 }  // namespace ressort::commands

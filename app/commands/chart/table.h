@@ -1,61 +1,56 @@
-// app/commands: what the chart knows of a scene, and how it is written down.
+// app/commands: the results of the chart, as a table. Pure.
 #pragma once
 
+#include <array>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "app/commands/chart/clock.h"
-#include "app/commands/chart/front.h"
-#include "app/commands/chart/judge.h"
 #include "app/commands/chart/ways.h"
 
 namespace ressort::commands {
 
+// What errors are measured against.
+enum ChartReference : std::size_t {
+  published,  // the published scheme at 44,100 Hz in long double
+  physical    // the continuous network of the same M, K and Z
+};
+
 struct ChartRow {
   Way way;
-  std::string methods;
-  std::vector<std::string> twins;
-  double ns = 0.0;            // per output sample, one voice
-  double upper_ns = 0.0;      // the upper quartile of all rounds
-  double predicted_ns = 0.0;  // by the plan's model
-  Judged judged;
-  std::string failure;                   // unstable or not passive, and when; empty if neither
-  bool is_on_front[2] = {false, false};  // [reference]
+  std::string methods;                // of its parts, "modal" or "grid+direct"
+  std::vector<std::string> twins;     // methods with the same output
+  double ns = 0.0;                    // per output sample, one voice; 0: not timed
+  std::array<double, 2> snr_db{};     // [ChartReference] NaN where it is unknown
+  std::string failure;                // why it is unstable; empty if it is stable
+  std::array<bool, 2> is_on_front{};  // [ChartReference]
 };
 
-// One scene's rows beside both references. The fronts and areas are those of ways that do not fail.
+// One scene.
 struct ChartSheet {
   std::string scene;
-  std::string about;
-  bool is_linear = false;
-  std::string reference[2];          // how each was found
-  std::array<double, 3> floor_db{};  // how far T2 agrees with itself
-  std::size_t window = 0;            // of the chart
-  double timed_s = 0.0;
-  int rounds = 0;  // each way was timed so often
+  std::string about;               // the excitation
+  std::string reference;           // how the physical reference was found
+  std::optional<double> floor_db;  // accuracy of a physical reference that is not exact
+  double window_s = 1.0;           // of the sound that is compared
   std::vector<ChartRow> rows;
-  double area[2] = {0.0, 0.0};            // dominated hypervolume, by measured times
-  double predicted_area[2] = {0.0, 0.0};  // by predicted ones: the same on every machine
-
-  double snr_db(const ChartRow& row, std::size_t reference) const;  // in the chart's window
 };
 
-// Sets the fronts and areas.
+// What a method costs, and how good it is.
+struct Trade {
+  double ns = 0.0;
+  double snr_db = 0.0;
+};
+
+// Finds the Pareto front: [trade] whether no other is both cheaper and better. The first of equal
+// trades is on it; a trade that is not finite never is.
+std::vector<bool> front_of(std::span<const Trade> trades);
+
+// Sets `is_on_front` of the stable rows.
 void find_fronts(ChartSheet& sheet);
 
-// The columns, for who reads them by a program.
-const std::vector<std::string>& chart_columns();
-
-// Where and by what the sheets were made, in a sentence for a picture's caption.
-struct Provenance {
-  std::string processor;
-  std::string compiler;
-  std::string date;     // ISO 8601
-  std::string program;  // its name, version and commit
-};
-std::string to_string(const Provenance& provenance);
-
-// All sheets as one table: what it means, in lines with '#'; names of columns; rows.
-std::string chart_csv(const std::vector<ChartSheet>& sheets, const Provenance& provenance);
+// Writes all sheets as CSV: comments that explain the columns, their names, a line per row.
+std::string chart_csv(const std::vector<ChartSheet>& sheets, const std::string& made_by);
 
 }  // namespace ressort::commands

@@ -6,25 +6,23 @@
 namespace ressort::commands {
 namespace {
 
-struct NamedPrecision {
-  Precision precision;
-  const char* name;
-};
-constexpr NamedPrecision precisions[] = {{Precision::float64, "double"},
-                                         {Precision::float32, "float"}};
-
 constexpr unsigned oversamplings[] = {2, 4, 8};
 constexpr const char* silences[] = {"-120", "-100", "-80", "-60", "-40"};
 constexpr const char* usual_silences[] = {"-100", "-80", "-60"};
 
-// Budgets beside a method: what the line is called, and the budget.
-struct Asked {
+// A budget and its name in the line.
+struct NamedBudget {
   std::string name;
   std::string budget;
 };
-const Asked every_method[] = {{"", ""}, {"passive", "passive=always"}};
-const Asked plans_choice[] = {
+const NamedBudget every_method[] = {{"", ""}, {"passive", "passive=always"}};
+const NamedBudget plans_choice[] = {
     {"auto", ""}, {"auto cents=1", "cents=1"}, {"auto passive", "passive=always"}};
+
+// Only methods whose error falls with the rate are oversampled.
+bool gains_by_oversampling(Method method) {
+  return method == Method::direct;
+}
 
 std::string together(const std::string& a, const std::string& b) {
   return a + (a.empty() || b.empty() ? "" : " ") + b;
@@ -32,11 +30,11 @@ std::string together(const std::string& a, const std::string& b) {
 
 void add_method(std::vector<Way>& ways, Method method) {
   const std::string name(method_name(method));
-  for (const Asked& asked : every_method) {
+  for (const NamedBudget& asked : every_method) {
     const std::string line = together(name, asked.name);
     ways.push_back({.name = line, .line = line, .method = method, .budget = asked.budget});
     for (const unsigned times : oversamplings) {
-      if (method == Method::direct) {  // the others have the same error at every rate
+      if (gains_by_oversampling(method)) {
         const std::string label = std::to_string(times) + "x";
         ways.push_back({.name = line + " " + label,
                         .line = line,
@@ -49,7 +47,7 @@ void add_method(std::vector<Way>& ways, Method method) {
   }
 }
 
-// Less and less of what is below the loudest.
+// Budgets that drop more and more of the soft modes.
 void add_truncation(std::vector<Way>& ways, const std::string& line, std::optional<Method> method,
                     const std::string& budget, std::span<const char* const> levels) {
   if (method && !budget.empty()) {
@@ -69,12 +67,7 @@ void add_truncation(std::vector<Way>& ways, const std::string& line, std::option
 }  // namespace
 
 const char* precision_name(Precision precision) {
-  for (const NamedPrecision& named : precisions) {
-    if (named.precision == precision) {
-      return named.name;
-    }
-  }
-  return "";
+  return precision == Precision::float64 ? "double" : "float";
 }
 
 std::vector<Way> all_ways() {
@@ -87,28 +80,20 @@ std::vector<Way> all_ways() {
   }
   add_truncation(ways, "modal cents=1", Method::modal, "cents=1", silences);
   add_truncation(ways, "modal", Method::modal, "", silences);
-  for (const Asked& asked : plans_choice) {
+  for (const NamedBudget& asked : plans_choice) {
     ways.push_back(
         {.name = asked.name, .line = asked.name, .budget = asked.budget, .is_bare = false});
   }
   add_truncation(ways, "auto", {}, "", usual_silences);
   add_truncation(ways, "auto cents=1", {}, "cents=1", usual_silences);
   std::vector<Way> all;
-  for (const auto& [precision, name] : precisions) {
+  for (const Precision precision : {Precision::float64, Precision::float32}) {
     for (Way way : ways) {
       way.precision = precision;
       all.push_back(std::move(way));
     }
   }
   return all;
-}
-
-double MadeWay::predicted_ns() const {
-  double sum = 0.0;
-  for (const Part& part : plan.parts) {
-    sum += part.predicted_ns;
-  }
-  return sum * way.oversampling;
 }
 
 Result<MadeWay> make_way(const ChartScene& scene, const Way& way, double seconds, Isa isa) {
@@ -129,13 +114,14 @@ Result<MadeWay> make_way(const ChartScene& scene, const Way& way, double seconds
   if (!compiled) {
     return compiled.error();
   }
-  MadeWay made{.way = way, .engine = std::move(compiled->engine), .plan = compiled->plan};
-  const bool obeys = std::any_of(made.plan.parts.begin(), made.plan.parts.end(),
+  MadeWay made{.way = way, .engine = std::move(compiled->engine)};
+  const std::vector<Part>& parts = compiled->plan.parts;
+  const bool obeys = std::any_of(parts.begin(), parts.end(),
                                  [&](const Part& part) { return part.method == way.method; });
   if (way.method && !obeys) {
-    return Error{std::string(method_name(*way.method)) + " cannot do this"};
+    return Error{std::string(method_name(*way.method)) + " cannot play this network"};
   }
-  for (const Part& part : made.plan.parts) {
+  for (const Part& part : parts) {
     const std::string name(method_name(part.method));
     if (made.methods.find(name) == std::string::npos) {
       made.methods += (made.methods.empty() ? "" : "+") + name;
@@ -143,19 +129,6 @@ Result<MadeWay> make_way(const ChartScene& scene, const Way& way, double seconds
   }
   made.player = make_player(made.machine(), scene.motions, seconds, way.precision, isa);
   return made;
-}
-
-bool same_kind(const Machine& a, const Machine& b) {
-  const auto runs = [](const LinkRun& x, const LinkRun& y) {
-    return x.law == y.law && x.scheme == y.scheme;
-  };
-  const auto parts = [&](const Program& x, const Program& y) {
-    return x.form.index() == y.form.index() &&
-           std::equal(x.link_runs.begin(), x.link_runs.end(), y.link_runs.begin(),
-                      y.link_runs.end(), runs);
-  };
-  return a.rate_hz == b.rate_hz &&
-         std::equal(a.parts.begin(), a.parts.end(), b.parts.begin(), b.parts.end(), parts);
 }
 
 }  // namespace ressort::commands

@@ -15,13 +15,13 @@ namespace {
 using Kind = FlightRecord::Kind;
 
 Error out_of_order(std::int64_t frame) {
-  return Error{"the flight is out of order at frame " + std::to_string(frame)};
+  return Error{"the flight has events out of order at frame " + std::to_string(frame)};
 }
 
 }  // namespace
 
 FlightPlayer::FlightPlayer(Flight flight, double heard_s) : flight_(std::move(flight)) {
-  // What is heard has one rate and one number of channels.
+  // The played part must have one sample rate and one number of channels.
   for (const FlightRecord& record : flight_.records) {
     if (record.kind == Kind::rate) {
       rate_hz_ = record.event.value;
@@ -46,7 +46,7 @@ Result<FlightPlayer> FlightPlayer::open(const std::string& path, double heard_s)
   }
   FlightPlayer player(*std::move(flight), heard_s);
   if (player.rate_hz_ <= 0.0 || player.channels_ == 0 || player.frames() <= 0) {
-    return Error{"'" + path + "': nothing is heard in this flight"};
+    return Error{"'" + path + "': the flight has no sound"};
   }
   return player;
 }
@@ -56,14 +56,15 @@ std::vector<std::string> FlightPlayer::warnings() const {
   const std::string ours = std::string(version) + " " + commit;
   if (flight_.made_by != ours) {
     all.push_back("the flight was made by ressort " + flight_.made_by + ", this is " + ours +
-                  ": it may sound otherwise");
+                  "; it may sound different");
   }
   if (flight_.isa != isa_name(best_isa())) {
-    all.push_back("the flight was made on a machine of level " + flight_.isa + ", this is " +
-                  std::string(isa_name(best_isa())) + ": its last bits may be others");
+    all.push_back("the flight was made with the instruction set " + flight_.isa +
+                  ", this machine has " + std::string(isa_name(best_isa())) +
+                  "; samples may differ in their last bits");
   }
   if (flight_.has_audio_inputs) {
-    all.emplace_back("what came in by the audio inputs is not in the flight");
+    all.emplace_back("the flight does not contain the audio inputs");
   }
   return all;
 }
@@ -77,11 +78,11 @@ Result<Done> FlightPlayer::play(const std::function<Result<Done>(std::span<const
   std::vector<float*> outputs;
   std::size_t channels = 0;
   std::int64_t period = 0;
-  std::int64_t left = 0;  // of the block
+  std::int64_t left = 0;  // remaining frames of the block
   std::size_t next = 0;
   const auto& records = flight_.records;
   for (std::int64_t frame = base; frame < flight_.end_frame;) {
-    // What was said before the block, and then what acts within the chunk.
+    // Events before the block, then events within the chunk.
     for (; next < records.size() && records[next].frame <= frame && left == 0 &&
            records[next].kind != Kind::event && records[next].kind != Kind::take;
          ++next) {

@@ -1,4 +1,4 @@
-// app/commands: a flight, played back: the same samples as were heard.
+// app/commands: replays a recorded flight: the same samples as during the performance.
 #pragma once
 
 #include <functional>
@@ -13,18 +13,18 @@ namespace ressort::commands {
 
 class FlightPlayer {
  public:
-  // Reads the file; an error has its line. `heard_s` are those of the end that shall be heard.
+  // Reads the file. Errors have its line. Only the last `heard_s` are played.
   static Result<FlightPlayer> open(const std::string& path, double heard_s);
 
   double rate_hz() const { return rate_hz_; }
   std::size_t channels() const { return channels_; }
-  std::int64_t frames() const { return flight_.end_frame - heard_from_; }  // that are heard
-  // Why it may not be what was heard; empty: it is.
+  std::int64_t frames() const { return flight_.end_frame - heard_from_; }  // of the played part
+  // Returns reasons why the sound may differ from the performance.
   std::vector<std::string> warnings() const;
 
-  // Computes all of it; `hear` gets the samples, interleaved, chunk by chunk, from where they are
-  // to be heard on. `progress` gets 0..1 and answers false to stop. The error: an engine cannot be
-  // made, or the events are out of their order. [any thread but audio]
+  // Replays the whole flight. `hear` gets the interleaved samples of the played part, chunk by
+  // chunk. `progress` gets 0..1 and returns false to stop. Fails if an engine cannot be created or
+  // if events are out of order. [any thread but audio]
   Result<Done> play(const std::function<Result<Done>(std::span<const float>)>& hear,
                     const std::function<bool(double)>& progress) const;
 

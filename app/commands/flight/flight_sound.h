@@ -1,4 +1,4 @@
-// app/commands: a flight as a sound file, or as sound to be played.
+// app/commands: renders a flight to a sound file or for playing.
 #pragma once
 
 #include <functional>
@@ -8,11 +8,12 @@
 
 namespace ressort::commands {
 
-// Of a RenderOptions whose name is a flight's: its last `seconds`, or flight_heard_s. As render().
+// Renders the last `seconds` of the flight that `name` refers to (default flight_heard_s), like
+// render().
 Result<Rendered> render_flight(const RenderOptions& options,
                                const std::function<bool(double)>& progress);
 
-// The same samples, to be played by a Process.
+// Renders the same samples for playing by a Process.
 Result<SampleTape> tape_of(const FlightPlayer& player, const std::function<bool(double)>& progress);
 
 }  // namespace ressort::commands

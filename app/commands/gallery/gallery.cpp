@@ -10,6 +10,7 @@
 
 #include "app/commands/gallery/page.h"
 #include "app/commands/progress_bar.h"
+#include "app/commands/put_figure.h"
 #include "app/exit_code.h"
 #include "app/realtime/thread_pool.h"
 #include "app/session/files.h"
@@ -21,16 +22,16 @@
 namespace ressort::commands {
 namespace {
 
-constexpr std::size_t spectrogram_rows = 217;  // two for each semitone of nine octaves, and one
+constexpr std::size_t spectrogram_rows = 217;  // two per semitone of nine octaves, and one
 constexpr std::size_t spectrogram_columns = 400;
 constexpr std::size_t envelope_steps = 620;
 constexpr double ring_out_s = 2.15;
-constexpr double margin_s = 0.15;  // at the end, where windows of a spectrogram would reach out
+constexpr double margin_s = 0.15;  // cut from the end: half a window of the spectrogram
 constexpr double note_length_s = 6.0;
 constexpr int note_key = 57;
 
-// How a preset's phrase differs from that of all: it lies among the keys that sound, and is played
-// slower where a bow or a finger has to stay.
+// Adapts the common phrase to a preset: to its range of keys, and to bowed or held notes, which are
+// slower.
 struct Register {
   int shift = 0;         // semitones, whole octaves
   double stretch = 1.0;  // of time
@@ -84,7 +85,7 @@ struct Take {
 
 using GoesOn = std::function<bool()>;
 
-// Renders notes to a file and reads that.
+// Renders notes to a file and reads the file.
 Result<Take> play_notes(const GalleryOptions& options, const std::string& preset,
                         const std::string& file, const std::vector<PhraseNote>& notes,
                         double length_s, int voices, const GoesOn& goes_on) {
@@ -110,66 +111,15 @@ Result<Take> play_notes(const GalleryOptions& options, const std::string& preset
   return Take{*std::move(rendered), *std::move(sound)};
 }
 
-// What of a note its pitch is taken from: after the attack, until it stays 40 dB softer than its
-// loudest, at least for 0.1 s.
-Stretch steady_stretch(const Sound& sound) {
-  constexpr double step_s = 0.01;
-  constexpr double from_s = 0.02;
-  constexpr double fall_db = 40.0;
-  constexpr double shortest_s = 0.1;
-  const std::vector<double> levels = levels_db(sound, {from_s, held_s}, step_s);
-  const double least_db = *std::max_element(levels.begin(), levels.end()) - fall_db;
-  const auto last =
-      std::find_if(levels.rbegin(), levels.rend(), [&](double db) { return db >= least_db; });
-  const auto steps = static_cast<double>(levels.rend() - last);
-  return {from_s, from_s + std::max(shortest_s, step_s * steps)};
-}
-
-// Of the partials from the lowest row on, the loudest between two times.
-std::optional<StrongPartial> loudest_partial(const Sound& sound, Stretch stretch) {
-  constexpr std::size_t columns = 20;
-  const Spectrogram rough = find_spectrogram(sound, stretch, spectrogram_rows, columns);
-  std::size_t best = 0;
-  double most = 0.0;
-  for (std::size_t row = 0; row < rough.rows; ++row) {
-    double power = 0.0;
-    for (std::size_t column = 0; column < columns; ++column) {
-      power += std::pow(10.0, 0.1 * rough.at(row, column));
-    }
-    if (power > most) {
-      most = power;
-      best = row;
-    }
-  }
-  constexpr double reach_cents = 100.0;
-  return partial_near(sound, stretch, rough.frequency_hz(best), reach_cents);
-}
-
-PresetFigures measure_sounds(const Take& phrase, const Take& note, double key_hz) {
-  const Sound& heard = phrase.sound;
-  const double length_s = static_cast<double>(heard.frames()) / heard.rate_hz;
-  const auto loudness = loudness_lufs(heard);
-  PresetFigures figures{.peak_dbfs = peak_dbfs(heard),
-                        .loudness_lufs = loudness ? *loudness : silence_db,
-                        .dc_dbfs = dc_dbfs(heard, {length_s - 1.0, length_s}),
-                        .stereo = stereo_image(heard),
-                        .attack_ms = attack_ms(note.sound, {0.0, held_s}),
-                        .held_t60_s = t60_s(note.sound, {0.0, held_s}),
-                        .released_t60_s = t60_s(note.sound, {held_s, note_length_s}),
-                        .cpu_share = note.rendered.cpu_s * note.sound.rate_hz /
-                                     static_cast<double>(std::max(1LL, note.rendered.frames))};
-  if (key_hz > 0.0) {
-    constexpr double semitone = 100.0;
-    const Stretch steady = steady_stretch(note.sound);
-    if (const auto partial = partial_near(note.sound, steady, key_hz, semitone)) {
-      figures.pitch_cents = cents_between(key_hz, partial->frequency_hz);
-    }
-    if (const auto partial =
-            loudest_partial(note.sound, {steady.from_s, std::min(1.0, steady.to_s)})) {
-      figures.loudest_cents = cents_between(key_hz, partial->frequency_hz);
-    }
-  }
-  return figures;
+PresetFigures measure_sounds(const Take& phrase, const Take& note) {
+  const auto loudness = loudness_lufs(phrase.sound);
+  return {.peak_dbfs = peak_dbfs(phrase.sound),
+          .loudness_lufs = loudness ? *loudness : silence_db,
+          .attack_ms = attack_ms(note.sound, {0.0, held_s}),
+          .held_t60_s = t60_s(note.sound, {0.0, held_s}),
+          .released_t60_s = t60_s(note.sound, {held_s, note_length_s}),
+          .cpu_share = note.rendered.cpu_s * note.sound.rate_hz /
+                       static_cast<double>(std::max(1LL, note.rendered.frames))};
 }
 
 std::vector<double> peaks_of(const Sound& sound, Stretch from_start, std::size_t steps) {
@@ -214,7 +164,14 @@ ShownPreset show(const GalleryOptions& options, const std::string& name, const G
   shown.peaks_dbfs = peaks_of(phrase->sound, whole, envelope_steps);
   shown.levels_dbfs = levels_db(phrase->sound, whole, whole.to_s / envelope_steps);
   shown.spectrogram = find_spectrogram(phrase->sound, whole, spectrogram_rows, spectrogram_columns);
-  shown.figures = measure_sounds(*phrase, *note, fundamental_hz(scene->preset, key));
+  shown.figures = measure_sounds(*phrase, *note);
+  const auto drawing = plot::to_svg(preset_figure(shown));
+  if (!drawing) {
+    shown.failure = drawing.error().message;
+    return shown;
+  }
+  // Within a page, without the line that says that it is XML.
+  shown.drawing = drawing->substr(drawing->find("<svg"));
   return shown;
 }
 
@@ -228,12 +185,12 @@ std::string today() {
   return date;
 }
 
-// All of them, by as many threads as the machine runs at once.
+// Plays all presets, one thread per core.
 std::vector<ShownPreset> show_all(const GalleryOptions& options,
                                   const std::vector<std::string>& names, const GoesOn& goes_on) {
   std::vector<ShownPreset> shown(names.size());
   ProgressBar bar(!options.is_quiet);
-  std::mutex mutex;  // of the next two, and of the bar
+  std::mutex mutex;  // guards the next two and the bar
   std::size_t next = 0;
   std::size_t done = 0;
   const auto work = [&] {
@@ -270,35 +227,40 @@ int gallery(const GalleryOptions& options, const GoesOn& goes_on) {
   const auto complain = [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); };
   const std::vector<std::string> names = known_presets();
   if (names.empty()) {
-    complain("there are no presets beside '" + models_folder() + "'");
+    complain("no presets found beside '" + models_folder() + "'");
+    return exit_code::wrong_use;
+  }
+  if (const auto found = plot::check_gnuplot(); !found) {
+    complain(found.error().message);
     return exit_code::wrong_use;
   }
   std::error_code error;
   std::filesystem::create_directories(options.folder, error);
   if (error) {
-    complain("the folder '" + options.folder + "' cannot be made: " + error.message());
+    complain("cannot create the folder '" + options.folder + "': " + error.message());
     return exit_code::wrong_use;
   }
   const std::vector<ShownPreset> shown = show_all(options, names, goes_on);
   if (!goes_on()) {
-    complain("interrupted; there is no page");
+    complain("interrupted; no page is written");
     return exit_code::our_failure;
   }
   const std::string made = std::string("ressort ") + version + " (" + commit + "), " + today() +
                            ", " + fixed(options.rate_hz, 0) + " Hz";
   const std::filesystem::path folder = options.folder;
-  for (const auto& [name, text] : {std::pair(std::string("index.html"), gallery_page(shown, made)),
-                                   std::pair(std::string("spectra.svg"), gallery_picture(shown))}) {
-    if (const auto written = write_text((folder / name).string(), text, Existing::replace);
-        !written) {
-      complain(written.error().message);
-      return exit_code::our_failure;
-    }
+  const bool is_forced = true;
+  if (const int code =
+          put_text((folder / "index.html").string(), gallery_page(shown, made), is_forced)) {
+    return code;
+  }
+  if (const int code =
+          put_figure((folder / "spectra.svg").string(), gallery_figure(shown), is_forced)) {
+    return code;
   }
   int code = exit_code::done;
   for (const ShownPreset& preset : shown) {
     if (!preset.failure.empty()) {
-      complain(preset.name + " could not be played:\n" + preset.failure);
+      complain(preset.name + ": not played: " + preset.failure);
       code = exit_code::our_failure;
     }
   }

@@ -1,4 +1,4 @@
-// app/commands: plays every preset a phrase and draws what can be heard.
+// app/commands: renders all presets and writes a page that compares them.
 #pragma once
 
 #include <functional>
@@ -9,15 +9,15 @@
 namespace ressort::commands {
 
 struct GalleryOptions {
-  std::string folder;  // for all of it; made where it is not there
+  std::string folder;  // created if it does not exist
   double rate_hz = 44100.0;
   bool is_quiet = false;
 };
 
-// Renders all presets that are known, a few at a time, and writes NAME.wav, NAME-note.wav,
-// index.html and spectra.svg into the folder, over what has these names. A preset that cannot be
-// played is told and shown without a picture. Stops where `goes_on`, which any thread may call,
-// says no. The exit code.
+// Renders all known presets, one per core at a time, and writes NAME.wav, NAME-note.wav, index.html
+// and spectra.svg into the folder, replacing existing files. Reports a preset that fails and lists
+// it without a figure. `goes_on`, which any thread may call, returns false to stop. Returns the
+// exit code.
 int gallery(const GalleryOptions& options, const std::function<bool()>& goes_on);
 
 }  // namespace ressort::commands

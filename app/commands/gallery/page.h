@@ -1,4 +1,4 @@
-// app/commands: what the gallery found, as a page and as a picture. Pure.
+// app/commands: the page and the figures of the gallery. Pure.
 #pragma once
 
 #include <optional>
@@ -8,51 +8,51 @@
 #include "app/commands/gallery/sound.h"
 #include "app/commands/gallery/spectrogram.h"
 #include "app/commands/offline.h"
+#include "app/plot/plot.h"
 
 namespace ressort::commands {
 
-// A note of the phrase, and where its fundamental should be; 0: keys do not set the pitch.
+// A note of the phrase, and its expected fundamental; 0: keys do not set the pitch.
 struct ShownNote {
   PhraseNote note;
   double fundamental_hz = 0.0;
 };
 
-// Of the phrase: peak, loudness, DC of its last second, stereo. Of one note, struck at
-// `note_velocity`, held for `held_s` and let go: all else.
+// Peak and loudness of the phrase; all else of one note at `note_velocity`, held for `held_s`.
 struct PresetFigures {
   double peak_dbfs = silence_db;
   double loudness_lufs = silence_db;
-  double dc_dbfs = silence_db;
-  std::optional<StereoImage> stereo;
   std::optional<double> attack_ms;
   std::optional<double> held_t60_s;      // while the key is down
-  std::optional<double> released_t60_s;  // from its release on
-  std::optional<double> pitch_cents;     // of the partial within a semitone of the key, off it
-  std::optional<double> loudest_cents;   // of the loudest partial of the first second, off the key
+  std::optional<double> released_t60_s;  // after its release
   double cpu_share = 0.0;                // of one core, for one voice
 };
 
 struct ShownPreset {
   std::string name;
   std::string description;
-  std::string failure;  // why it could not be played; the rest is empty then
+  std::string failure;  // error message; the rest is empty then
   std::vector<ShownNote> notes;
   std::vector<double> peaks_dbfs;   // of the phrase, in equal steps
-  std::vector<double> levels_dbfs;  // the same as root mean square
+  std::vector<double> levels_dbfs;  // RMS, in the same steps
   Spectrogram spectrogram;          // of the phrase
   PresetFigures figures;
+  std::string drawing;  // its figure, as SVG
 };
 
 inline constexpr int note_velocity = 100;
 inline constexpr double held_s = 3.0;
 
-// A page that needs nothing but the sounds beside it. `made`: by what and when.
+// Returns the HTML page, which needs nothing but the sounds beside it. `made`: program and date.
 std::string gallery_page(const std::vector<ShownPreset>& presets, const std::string& made);
 
-// All spectrograms, small, in one SVG picture.
-std::string gallery_picture(const std::vector<ShownPreset>& presets);
+// The levels and the spectrogram of one preset.
+plot::Figure preset_figure(const ShownPreset& preset);
 
-// The figures as people read them, a row for each preset under a head.
+// All spectrograms, small.
+plot::Figure gallery_figure(const std::vector<ShownPreset>& presets);
+
+// Returns the figures as a table with a header row and a row per preset.
 std::vector<std::vector<std::string>> gallery_table(const std::vector<ShownPreset>& presets);
 
 }  // namespace ressort::commands

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "app/commands/gallery/png.h"
-
 namespace ressort::commands {
 namespace {
 
@@ -25,7 +23,7 @@ Wavelet make_wavelet(double frequency_hz, double rate_hz) {
   for (std::size_t n = 0; n < count; ++n) {
     const double middle = static_cast<double>(n) - 0.5 * static_cast<double>(count - 1);
     const double phase = 2.0 * std::numbers::pi * frequency_hz / rate_hz * middle;
-    // The windows' sum is half their length: a sinusoid of amplitude 1 gives 1.
+    // A Hann window sums to half its length, so a sinusoid of amplitude 1 gives 1.
     const double weight =
         2.0 / static_cast<double>(count) *
         (1.0 + std::cos(2.0 * std::numbers::pi * middle / static_cast<double>(count)));
@@ -62,7 +60,7 @@ Spectrogram find_spectrogram(const Sound& sound, Stretch stretch, std::size_t ro
   Spectrogram made{
       .from_s = stretch.from_s, .to_s = stretch.to_s, .rows = rows, .columns = columns};
   made.dbfs.assign(rows * columns, silence_db);
-  std::vector<const std::vector<double>*> heard;  // a channel that repeats the first adds nothing
+  std::vector<const std::vector<double>*> heard;  // without copies of the first channel
   for (const std::vector<double>& channel : sound.channels) {
     if (heard.empty() || channel != *heard[0]) {
       heard.push_back(&channel);
@@ -99,20 +97,6 @@ Spectrogram made_smaller(const Spectrogram& from, std::size_t rows, std::size_t 
     }
   }
   return made;
-}
-
-std::string to_data_url(const Spectrogram& spectrogram, double lightest_dbfs, double darkest_dbfs) {
-  constexpr double steps = 48.0;
-  std::vector<std::uint8_t> pixels;
-  for (std::size_t row = spectrogram.rows; row-- > 0;) {
-    for (std::size_t column = 0; column < spectrogram.columns; ++column) {
-      const double share =
-          (spectrogram.at(row, column) - lightest_dbfs) / (darkest_dbfs - lightest_dbfs);
-      const double step = std::round(steps * std::clamp(share, 0.0, 1.0)) / steps;
-      pixels.push_back(static_cast<std::uint8_t>(std::lround(255.0 * (1.0 - step))));
-    }
-  }
-  return png_data_url(pixels, spectrogram.columns, spectrogram.rows);
 }
 
 }  // namespace ressort::commands

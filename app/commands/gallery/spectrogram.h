@@ -1,4 +1,4 @@
-// app/commands: which frequencies sound when, on a logarithmic axis. Pure.
+// app/commands: spectrograms with a logarithmic frequency axis. Pure.
 #pragma once
 
 #include <cstddef>
@@ -14,25 +14,21 @@ struct Spectrogram {
   double highest_hz = 14080.0;  // nine octaves higher
   double from_s = 0.0;
   double to_s = 0.0;
-  std::size_t rows = 0;  // from the lowest, at equal ratios, the last one at the highest
+  std::size_t rows = 0;  // at equal ratios, from the lowest to the highest frequency
   std::size_t columns = 0;
-  std::vector<double> dbfs;  // [row][column], of a steady sinusoid; the channels' powers added up
+  std::vector<double> dbfs;  // [row][column], level of a sinusoid, mean power of the channels
 
   double at(std::size_t row, std::size_t column) const { return dbfs[row * columns + column]; }
   double frequency_hz(std::size_t row) const;
 };
 
-// By the constant-Q transform (Brown 1991): each frequency under a Hann window of 34 of its
-// periods, two rows' width, but no shorter than 12 ms and no longer than 0.3 s. What is above
-// half the rate stays silent. O(columns * rate * sum of the windows)
+// Computes a constant-Q transform (Brown 1991). The Hann window of each frequency has 34 periods,
+// two rows' bandwidth, clamped to 12 ms to 0.3 s. Frequencies above half the rate are silent.
+// O(columns * rate * sum of the windows)
 Spectrogram find_spectrogram(const Sound& sound, Stretch stretch, std::size_t rows,
                              std::size_t columns);
 
-// The same in fewer cells, each as loud as the loudest that it holds.
+// Downsamples to fewer cells, each with its highest level.
 Spectrogram made_smaller(const Spectrogram& from, std::size_t rows, std::size_t columns);
-
-// As a grey picture for a page, "data:image/png;base64,...": `lightest_dbfs` and less is white,
-// `darkest_dbfs` and more black, in 48 steps. Low frequencies are below.
-std::string to_data_url(const Spectrogram& spectrogram, double lightest_dbfs, double darkest_dbfs);
 
 }  // namespace ressort::commands

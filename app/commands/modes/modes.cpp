@@ -2,7 +2,8 @@
 
 #include <cstdio>
 
-#include "app/commands/modes/shapes_svg.h"
+#include "app/commands/modes/shapes_figure.h"
+#include "app/commands/put_figure.h"
 #include "app/exit_code.h"
 #include "app/session/admit.h"
 #include "app/session/files.h"
@@ -22,7 +23,7 @@ int refuse(const std::string& message) {
   return exit_code::wrong_use;
 }
 
-// The scene with dampers and springs as they were asked for.
+// Applies --decay and --tune to the scene.
 Result<Done> tune(Scene& scene, const std::vector<double>& parameters, const ModesOptions& options,
                   const ModeOptions& search) {
   if (!options.decay.empty()) {
@@ -30,7 +31,8 @@ Result<Done> tune(Scene& scene, const std::vector<double>& parameters, const Mod
     if (!law) {
       return law.error();
     }
-    std::fprintf(stderr, "every mode decays by %.4g + %.4g f^2 a second: T60 = 6.91 s over that\n",
+    std::fprintf(stderr,
+                 "decay rate of every mode: %.4g + %.4g f^2 per second; T60 = 6.91 / rate\n",
                  law->a, law->b);
     scene.network = with_decay(scene.network, *law);
   }
@@ -41,8 +43,8 @@ Result<Done> tune(Scene& scene, const std::vector<double>& parameters, const Mod
     }
     if (!scene.network.macros.empty() && tuned->macros.empty() && !scene.network.taps.empty()) {
       std::fprintf(stderr,
-                   "strings and meshes are written out mass by mass; inputs and outputs "
-                   "between their masses are at the nearest one\n");
+                   "strings and meshes are written mass by mass; inputs and outputs move to the "
+                   "nearest mass\n");
     }
     scene.network = *std::move(tuned);
   }
@@ -50,20 +52,18 @@ Result<Done> tune(Scene& scene, const std::vector<double>& parameters, const Mod
 }
 
 void tell(const Scene& scene, const KnownModes& modes) {
-  std::printf(
-      "%s: %s%s of %s, %s\n", scene.path.c_str(), modes.is_all ? "" : "the lowest ",
-      counted(modes.modes.size(), "mode", "modes").c_str(),
-      counted(modes.masses, "mass that moves", "masses that move").c_str(),
-      modes.scheme == ModeScheme::published
-          ? ("as the published scheme plays them at " + fixed(modes.rate_hz, 0) + " Hz").c_str()
-          : "of the continuous network");
+  std::printf("%s: %s%s of %s, %s\n", scene.path.c_str(), modes.is_all ? "" : "the lowest ",
+              counted(modes.modes.size(), "mode", "modes").c_str(),
+              counted(modes.masses, "mass that moves", "masses that move").c_str(),
+              modes.scheme == ModeScheme::published
+                  ? ("in the published scheme at " + fixed(modes.rate_hz, 0) + " Hz").c_str()
+                  : "in the continuous network");
   if (!modes.is_linear) {
     std::printf(
-        "at rest: what bows, plucks or touches is open, and springs that stiffen are as they "
-        "begin\n");
+        "at rest: bows, plucks and contacts do not touch, and nonlinear springs are linearised\n");
   }
   if (has_waveguide(scene.network)) {
-    std::printf("without the waveguides, whose partials are no modes, and what holds on to them\n");
+    std::printf("waveguides and the links to them are left out\n");
   }
   std::printf("%s\n", to_table(modes).c_str());
 }
@@ -77,11 +77,14 @@ int modes_command(const ModesOptions& options) {
     return refuse("-o: expected a file that ends in " + wanted + ", found '" + options.output +
                   "'");
   }
+  if (auto found = plot::check_gnuplot(); !options.output.empty() && !is_tuning && !found) {
+    return refuse(options.output + ": " + found.error().message);
+  }
   LoadNews news(options.name,
                 [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
   const Progress progress([&](std::string_view stage) {
     news.at(stage);
-    return true;  // Ctrl-C ends it at once
+    return true;  // Ctrl-C ends the process
   });
   auto scene = load_scene(options.name, {.third = options.third, .progress = progress});
   if (!scene) {
@@ -104,31 +107,32 @@ int modes_command(const ModesOptions& options) {
   if (auto tuned = tune(*scene, parameters, options, search); !tuned) {
     return refuse(to_string(finding_of(scene->model_path, "", tuned.error())));
   }
-  std::string file;
+  plot::Figure figure;
   Result<KnownModes> modes = Error{};
   if (!as_written.empty()) {
     const auto found = find_modes(scene->network, parameters, search);
     if (found) {
-      file = shapes_svg(*found, scene->network, as_written);
+      figure = network_shapes_figure(*found, scene->network, as_written);
       modes = known_modes(*found);
     } else {
       modes = found.error();
     }
   } else {
     modes = known_modes(*scene, parameters, search);
-    file = is_tuning ? print_network(scene->network) : "";
   }
   if (!modes) {
     return refuse(to_string(finding_of(scene->model_path, "", modes.error())));
   }
-  // What is told of modes is not all that it does: what runs away without swinging is no mode.
+  // Warns about divergence without oscillation, which is not a mode.
   if (search.scheme == ModeScheme::published) {
     if (const auto warning = instability(*scene, parameters, search.rate_hz, progress)) {
       std::fprintf(stderr, "%s\n", to_string(*warning).c_str());
     }
   }
   if (!options.output.empty()) {
-    if (const int code = put_text(options.output, file, options.force); code != exit_code::done) {
+    if (const int code =
+            is_tuning ? put_text(options.output, print_network(scene->network), options.force)
+                      : put_figure(options.output, figure, options.force)) {
       return code;
     }
   }

@@ -1,5 +1,4 @@
-// app/commands: which modes a model or a preset has, and the model with other ones. The exit code
-// comes back.
+// app/commands: computes the modes of a model or a preset, and tunes them.
 #pragma once
 
 #include <optional>
@@ -14,18 +13,18 @@ namespace ressort::commands {
 
 struct ModesOptions {
   std::string name;
-  std::string output;     // an .svg of their shapes, or the .mdl that is tuned; empty: none
-  std::size_t count = 0;  // of the lowest; 0: all of a small model
+  std::string output;     // .svg of the mode shapes, or the tuned .mdl; empty: none
+  std::size_t count = 0;  // number, from the lowest; 0: all of a small model
   double rate_hz = 44100.0;
-  bool is_continuous = false;  // instead of the published scheme's
+  bool is_continuous = false;  // instead of the published scheme
   bool as_json = false;
-  bool force = false;                  // write over a file that is there
-  std::vector<double> frequencies_hz;  // that the lowest modes shall have
-  std::vector<DecayPoint> decay;       // that every mode shall follow
-  std::optional<ThirdArgument> third;  // whatever preset and model say
+  bool force = false;                  // overwrites an existing file
+  std::vector<double> frequencies_hz;  // targets of the lowest modes
+  std::vector<DecayPoint> decay;       // targets of all modes
+  std::optional<ThirdArgument> third;  // empty: as the preset or the model says
 };
 
-// Tells the modes on stdout, those of the tuned model where it is to be tuned. [main]
+// Prints the modes, after tuning. Returns the exit code. [main]
 int modes_command(const ModesOptions& options);
 
 }  // namespace ressort::commands

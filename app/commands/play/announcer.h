@@ -1,4 +1,4 @@
-// app/commands: what a program that plays says, and how it ends if nobody can wait.
+// app/commands: messages of the program while it plays, and its forced exit.
 #pragma once
 
 #include <chrono>
@@ -14,7 +14,7 @@
 
 namespace ressort::commands {
 
-// What a person hears of the program while it plays: above the console's prompt if there is one.
+// Prints messages above the console's prompt, if there is one.
 class Announcer {
  public:
   void say(const std::string& text) {
@@ -35,8 +35,7 @@ class Announcer {
   Terminal* terminal_ = nullptr;
 };
 
-// Ends the program where ending takes longer than anybody waits: a library is at work, or what it
-// has freed is large.
+// Exits the process if a regular shutdown takes too long, for example in a library.
 class LastResort {
  public:
   LastResort()

@@ -13,7 +13,7 @@ namespace fs = std::filesystem;
 constexpr const char* list_name = "stage.txt";
 constexpr std::string_view list_head = "ressort stage 1";
 
-// What follows a word at the beginning of a line.
+// Returns the rest of a line after its first word.
 std::optional<std::string> behind(std::string_view line, std::string_view word) {
   return line.starts_with(word) && line.size() > word.size() && line[word.size()] == ' '
              ? std::optional(std::string(line.substr(word.size() + 1)))
@@ -27,7 +27,7 @@ Result<Done> keep_stage(const std::string& folder, Session& session,
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) {
-    return Error{"the folder '" + folder + "' cannot be made: " + error.message()};
+    return Error{"cannot create the folder '" + folder + "': " + error.message()};
   }
   const auto scene = session.save_to(folder);
   if (!scene) {
@@ -49,7 +49,7 @@ Result<Done> keep_stage(const std::string& folder, Session& session,
   for (const Cable& cable : cables) {
     list += "cable " + cable.ours + " " + cable.theirs + "\n";
   }
-  // Last: it is the list that says what belongs to it.
+  // Written last: the list names the files that belong to the stage.
   return write_text((fs::path(folder) / list_name).string(), list, Existing::replace);
 }
 
@@ -96,7 +96,7 @@ Result<KeptStage> find_stage(const std::string& folder) {
       stage.tuning.push_back((fs::path(folder) / *tuning).string());
     } else if (const auto cable = behind(said, "cable");
                cable && cable->find(' ') != std::string::npos) {
-      // No port of ours has a blank in it, others may.
+      // Port names of other programs may contain blanks; ours never do.
       stage.cables.push_back(
           {cable->substr(0, cable->find(' ')), cable->substr(cable->find(' ') + 1)});
     } else {

@@ -1,5 +1,5 @@
-// app/commands: all that a session manager wants to find again, in a folder: the preset as it is
-// now and the texts that it is read from, the tuning, the cables.
+// app/commands: the state that a session manager stores in a folder: the current preset with its
+// source files, the tuning and the JACK connections.
 #pragma once
 
 #include <string>
@@ -11,19 +11,19 @@
 namespace ressort::commands {
 
 struct KeptStage {
-  std::string scene;                // a path; empty: nothing was kept
-  std::vector<std::string> tuning;  // paths, as the command `tuning` takes them
+  std::string scene;                // path; empty: nothing was saved
+  std::vector<std::string> tuning;  // paths, as for the command `tuning`
   std::vector<Cable> cables;
 };
 
-// Writes it all; what was kept there before is replaced when the new is whole. Blocks on the disk.
+// Writes the state and then replaces the previous one. Blocks on the disk.
 Result<Done> keep_stage(const std::string& folder, Session& session,
                         const std::vector<Cable>& cables);
 
-// What it would write now but for the cables, told apart by its text; empty: nothing is loaded.
+// Returns the state without the connections as a text to compare; empty if nothing is loaded.
 std::string stage_state(const Session& session);
 
-// Nothing kept where there is no such folder; an error where there is one that cannot be read.
+// Reads the state. Empty if the folder does not exist; fails if it cannot be read.
 Result<KeptStage> find_stage(const std::string& folder);
 
 }  // namespace ressort::commands

@@ -1,4 +1,4 @@
-// The command play: everything that runs while the program plays.
+// The command play.
 #include <signal.h>
 #include <unistd.h>
 
@@ -30,7 +30,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Signals are waited for, not handled: every thread inherits this, so that they reach main alone.
+// Blocks the signals in all threads, which inherit the mask, so that only main waits for them.
 sigset_t block_signals() {
   sigset_t signals;
   sigemptyset(&signals);
@@ -42,7 +42,7 @@ sigset_t block_signals() {
   return signals;
 }
 
-// Everything that runs while the program plays, in the order in which it has to end.
+// All parts of the playing program, declared in reverse order of their shutdown.
 class Player {
  public:
   explicit Player(const PlayOptions& options) : options_(options), signals_(block_signals()) {}
@@ -52,7 +52,7 @@ class Player {
       complain(allowed.error().message);
       return exit_code::wrong_use;
     }
-    if (names_midi_file(options_.name)) {  // the first argument may be the song
+    if (names_midi_file(options_.name)) {  // MODEL may be a MIDI file
       options_.midi = std::exchange(options_.name, PlayOptions().name);
     }
     std::optional<MidiFile> song;
@@ -89,8 +89,8 @@ class Player {
     if (options_.threads > 1) {
       const auto threads = static_cast<std::size_t>(options_.threads);
       if (threads > core_count()) {
-        voice_.say("--threads " + std::to_string(threads) + ": this machine runs " +
-                   std::to_string(core_count()) + " at once, and so many are used");
+        voice_.say("--threads " + std::to_string(threads) + ": using " +
+                   std::to_string(core_count()) + ", the number of cores of this machine");
       }
       helpers_ = std::make_unique<ThreadPool>(std::min(threads, core_count()), &process_.clock);
     }
@@ -146,7 +146,7 @@ class Player {
 
   ~Player() {
     if (session_) {
-      session_->end();  // a command may be waiting for a load
+      session_->end();  // wakes commands that wait for a load
     }
     voice_.set_terminal(nullptr);
     terminal_.reset();
@@ -161,7 +161,7 @@ class Player {
     if (device_.close) {
       fade_out();
     }
-    // The session's worker may still call the device; the device's thread never calls the session.
+    // The session's worker may still call the device, but the device never calls the session.
     session_.reset();
     device_ = AudioDevice();
   }
@@ -179,14 +179,14 @@ class Player {
     return exit_code::done;
   }
 
-  // Below the audio thread, which takes over what they have not done in time.
+  // At a lower priority than the audio thread, which takes over late tasks.
   void raise_helpers() {
     if (helpers_ && device_.priority > 1) {
       helpers_->set_priority(device_.priority - 1);
     }
   }
 
-  // The same kind once more; false where that is not there.
+  // Reopens a device of the same kind; returns false if it is not available.
   bool reopen_device(const std::string& kind) {
     auto device = open_audio(kind, process_, options_.device);
     if (!device) {
@@ -203,8 +203,7 @@ class Player {
     return true;
   }
 
-  // Under a session manager nothing is opened before it has said what. It may not be there any
-  // more.
+  // Waits for the session manager to name the session, if it still runs.
   int join_manager() {
     const char* const url = std::getenv("NSM_URL");
     if (url == nullptr || *url == '\0') {
@@ -225,7 +224,7 @@ class Player {
       const bool is_late = std::chrono::steady_clock::now() > end && manager_->manager().empty();
       if (is_late || !manager_->refusal().empty()) {
         voice_.say("playing without the session manager at " + std::string(url) + ": " +
-                   (is_late ? "nobody answers there" : manager_->refusal()));
+                   (is_late ? "no answer" : manager_->refusal()));
         manager_.reset();
         return exit_code::done;
       }
@@ -233,7 +232,7 @@ class Player {
     return exit_code::done;
   }
 
-  // Before anything sounds the choice of what will; later, all in the place of what is there.
+  // Before the sound starts: selects the scene. Later: replaces the current state.
   Result<Done> open_project(const NsmProject& project) {
     auto stage = find_stage(project.path);
     if (!stage) {
@@ -263,7 +262,7 @@ class Player {
         device_ = AudioDevice();
       }
       if (!reopen_device(device_kind_)) {
-        return Error{"the audio device cannot be opened again"};
+        return Error{"cannot reopen the audio device"};
       }
       tune_as_kept();
     }
@@ -286,7 +285,7 @@ class Player {
     console_->run_line(tuning_.empty() ? "tuning off" : line);
   }
 
-  // The sound of a flight, computed first and then played as it is.
+  // Renders a flight completely and then plays it.
   int play_flight() {
     const auto player = FlightPlayer::open(options_.name, flight_heard_s);
     if (!player) {
@@ -310,8 +309,8 @@ class Player {
       return failure;
     }
     if (device_.rate_hz != player->rate_hz()) {
-      complain("the flight is at " + fixed(player->rate_hz(), 0) + " Hz, " + device_.description +
-               "; -a alsa or -a dummy plays it at its own rate, render makes a file of it");
+      complain("the flight is at " + fixed(player->rate_hz(), 0) + " Hz, but the device is " +
+               device_.description + "; use -a alsa or -a dummy, or render it to a file");
       return exit_code::wrong_use;
     }
     voice_.say(options_.name + ": the last " +
@@ -342,10 +341,10 @@ class Player {
     }
     if (device_.kind != "dummy" && !may_raise_priority()) {
       voice_.say(
-          "without permission for real-time priority the sound may break up; to have it, type\n"
+          "no permission for real-time priority, so the sound may drop out; to get it, run\n"
           "  echo '@audio - rtprio 95' | sudo tee /etc/security/limits.d/ressort.conf\n"
           "  sudo usermod -aG audio $USER\n"
-          "and log in anew");
+          "and log in again");
     }
     voice_.say(loaded.name + ": " + counted(loaded.instrument.masses, "mass", "masses") + ", " +
                counted(loaded.instrument.links, "link", "links") + ", " +
@@ -359,7 +358,7 @@ class Player {
     }
   }
 
-  // The sound is worth more than a port.
+  // Plays on without OSC if the port is taken.
   void open_osc() {
     const auto hear = [this](const std::string& news) { tell(news); };
     if (options_.osc.port != 0) {
@@ -373,7 +372,7 @@ class Player {
     if (osc_ == nullptr) {
       if (auto unheard = OscServer::open_unheard(process_, *session_, hear);
           unheard && options_.panel.port != 0) {
-        osc_ = *std::move(unheard);  // the panel's way in
+        osc_ = *std::move(unheard);  // used by the panel
       }
       return;
     }
@@ -392,7 +391,9 @@ class Player {
     }
     voice_.say("panel: " + (*panel)->address());
     if ((*panel)->is_for_all()) {
-      voice_.say("whoever has this address, token and all, can play and load; it is not encrypted");
+      voice_.say(
+          "anyone with this address and its token can play and load; the connection is not "
+          "encrypted");
     }
     const std::lock_guard lock(panel_mutex_);
     panel_ = *std::move(panel);
@@ -447,7 +448,7 @@ class Player {
     }
     if (!options_.no_console) {
       if (isatty(STDIN_FILENO) != 0) {
-        voice_.say("type 'help' for what there is, 'keys' to play, 'quit' to leave");
+        voice_.say("type 'help' for the commands, 'keys' to play, 'quit' to leave");
       }
       terminal_ = std::make_unique<Terminal>(*console_, [this] { quit_.raise(); });
       voice_.set_terminal(terminal_.get());
@@ -455,7 +456,7 @@ class Player {
     return wait();
   }
 
-  // Whether a signal has come, or comes within so long.
+  // Waits for a signal, at most this long.
   bool is_called_off(std::chrono::milliseconds patience) {
     const timespec time{0, std::chrono::nanoseconds(patience).count()};
     if (!has_called_off_ && sigtimedwait(&signals_, nullptr, &time) > 0) {
@@ -465,7 +466,7 @@ class Player {
     return has_called_off_;
   }
 
-  // For what another thread does, or for a signal: that ends the session, and so what is loaded.
+  // Waits for another thread or for a signal, which ends the session and its load.
   template <class Future>
   void wait_for(const Future& future) {
     while (future.wait_for(0ms) != std::future_status::ready) {
@@ -486,7 +487,7 @@ class Player {
         manager_->poll();
       }
       if (device_.is_lost()) {
-        voice_.say("the audio of " + device_.description + " is gone");
+        voice_.say("the connection to " + device_.description + " is lost");
         if (options_.exit_on_loss) {
           return exit_code::audio_lost;
         }
@@ -508,7 +509,7 @@ class Player {
     return exit_code::done;
   }
 
-  // After a song: whether nothing has been heard for half a second, or something for a minute.
+  // After a MIDI file: true after half a second of silence, or after a minute.
   bool has_fallen_silent() {
     constexpr double quiet_db = -80.0;
     const auto now = std::chrono::steady_clock::now();
@@ -519,7 +520,7 @@ class Player {
     return now - *quiet_since_ > 500ms || now - *song_ended_ > 60s;
   }
 
-  // Waits for the same backend to come back; false if the user loses patience first.
+  // Waits until the same backend is available again; returns false if the user quits first.
   bool regain() {
     const std::string kind = device_.kind;
     options_.device.wiring = device_.wiring();
@@ -528,7 +529,7 @@ class Player {
       const std::lock_guard lock(device_mutex_);
       device_ = AudioDevice();
     }
-    voice_.say("waiting for it to come back; 'quit' or Ctrl-C ends that");
+    voice_.say("waiting for it to restart; 'quit' or Ctrl-C exits");
     while (!quit_.is_raised()) {
       if (is_called_off(200ms)) {
         return false;
@@ -545,7 +546,7 @@ class Player {
     return false;
   }
 
-  // So that leaving does not click.
+  // Fades out, to avoid a click.
   void fade_out() {
     const TimedEvent panic{Event{.kind = EventKind::panic}};
     process_.send(process_.from_console, {&panic, 1});
@@ -555,7 +556,7 @@ class Player {
   PlayOptions options_;
   sigset_t signals_;
   bool has_called_off_ = false;            // by a signal
-  std::optional<LastResort> last_resort_;  // from then on; it goes last
+  std::optional<LastResort> last_resort_;  // set by the first signal; destroyed last
   MotionFeed motion_{process_};
   std::unique_ptr<const SampleTape> tape_;  // outlives the process that plays it
   std::unique_ptr<ThreadPool> helpers_;     // outlives the engines; null: the audio thread is alone
@@ -565,15 +566,15 @@ class Player {
   MidiDoor door_{process_};
   std::mutex device_mutex_;  // between main and the session's worker
   AudioDevice device_;
-  std::string device_kind_;  // that was opened
+  std::string device_kind_;  // of the open device
   int audio_inputs_ = 0;
-  std::unique_ptr<NsmClient> manager_;  // null: there is none
-  NsmProject project_;                  // that it has opened
-  std::string first_name_;              // of what plays where nothing was kept
-  std::vector<std::string> tuning_;     // that was kept
+  std::unique_ptr<NsmClient> manager_;  // null: none
+  NsmProject project_;                  // the open one
+  std::string first_name_;              // played if the session is new
+  std::vector<std::string> tuning_;     // from the session
   std::unique_ptr<Session> session_;
   std::unique_ptr<OscServer> osc_;
-  std::mutex panel_mutex_;  // whoever has news, and who opens and closes it
+  std::mutex panel_mutex_;  // guards the panel's pointer
   std::unique_ptr<WebPanel> panel_;
   std::unique_ptr<MidiInput> midi_;
   std::optional<MidiPlayer> player_;

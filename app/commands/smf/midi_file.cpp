@@ -13,7 +13,7 @@ using Bytes = std::span<const std::uint8_t>;
 
 constexpr double longest_s = 24.0 * 3600.0;
 
-// What an event is for the reader; a tempo's `count` is the microseconds of a quarter note.
+// A parsed event. `count` of a tempo is the length of a quarter note in microseconds.
 struct TrackEvent {
   enum class Kind : std::uint8_t { message, tempo, end };
   std::uint64_t tick = 0;
@@ -22,7 +22,7 @@ struct TrackEvent {
   std::uint32_t count = 0;
 };
 
-// Reads on, and knows where it is. After the first failure everything reads 0.
+// Reads bytes in order. After the first failure it returns 0.
 class Reader {
  public:
   Reader(Bytes file, std::size_t at, std::size_t end) : file_(file), at_(at), end_(end) {}
@@ -42,7 +42,7 @@ class Reader {
 
   Bytes take(std::size_t count, const char* what) {
     if (count > left()) {
-      fail(end_, std::string("it ends within ") + what);
+      fail(end_, std::string("the file ends within ") + what);
       at_ = end_;
       return {};
     }
@@ -59,7 +59,7 @@ class Reader {
     return value;
   }
 
-  // Of variable length: seven bits a byte, at most four bytes.
+  // Reads a variable-length quantity: seven bits per byte, at most four bytes.
   std::uint32_t quantity(const char* what) {
     const std::size_t start = at_;
     std::uint32_t value = 0;
@@ -101,7 +101,7 @@ class Track {
         {tick_, kind, static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(count)});
   }
 
-  // A message: its status, if there is one, and bytes of the file.
+  // Appends a message: its status, if any, and bytes of the file.
   void add_message(int status, Bytes data) {
     const std::size_t first = bytes_.size();
     if (status != 0) {
@@ -111,12 +111,12 @@ class Track {
     add(TrackEvent::Kind::message, first, bytes_.size() - first);
   }
 
-  // False: the track has ended.
+  // Returns false at the end of the track.
   bool read_event() {
     const std::size_t start = reader_.at();
     if (reader_.peek() < 0x80) {
       if (running_ == 0 && reader_.left() > 0) {
-        reader_.fail(start, "a data byte where an event was expected, and no status before it");
+        reader_.fail(start, "expected an event, found a data byte without a running status");
       }
       read_channel_message();
       return true;
@@ -134,7 +134,7 @@ class Track {
     } else if (status == 0xff) {
       return read_meta(start);
     } else {
-      reader_.fail(start, "a status that no file may hold");
+      reader_.fail(start, "this status byte is not allowed in a file");
     }
     return true;
   }
@@ -145,7 +145,7 @@ class Track {
     const Bytes data = reader_.take(kind == 0xc0 || kind == 0xd0 ? 1 : 2, "a channel message");
     for (std::size_t i = 0; i < data.size(); ++i) {
       if (data[i] >= 0x80) {
-        reader_.fail(start + i, "a status where a data byte was expected");
+        reader_.fail(start + i, "expected a data byte, found a status byte");
       }
     }
     if (!reader_.failure()) {
@@ -165,7 +165,7 @@ class Track {
                                                  static_cast<std::uint32_t>(data[1]) << 8 | data[2]
                                            : 0;
       if (quarter_us == 0) {
-        reader_.fail(start, "a tempo has three bytes, and is not 0");
+        reader_.fail(start, "a tempo must have three bytes and must not be 0");
       }
       add(TrackEvent::Kind::tempo, 0, quarter_us);
     }
@@ -176,13 +176,14 @@ class Track {
   std::vector<TrackEvent>& events_;
   std::vector<std::uint8_t>& bytes_;
   std::uint64_t tick_ = 0;
-  int running_ = 0;  // the last channel message's status
+  int running_ = 0;  // running status
 };
 
-// Seconds of a tick: of a quarter note's share, which tempo changes, or of an SMPTE frame's.
+// Duration of a tick: a fraction of a quarter note, which depends on the tempo, or of an SMPTE
+// frame.
 struct Division {
-  double ticks_per_quarter = 0.0;  // 0: ticks are shares of frames
-  double tick_s = 0.0;             // of frames
+  double ticks_per_quarter = 0.0;  // 0: ticks divide SMPTE frames
+  double tick_s = 0.0;             // of SMPTE time
 };
 
 Division read_division(Reader& reader) {
@@ -190,7 +191,7 @@ Division read_division(Reader& reader) {
   const std::uint32_t division = reader.number(2, "the header");
   if (division < 0x8000) {
     if (division == 0) {
-      reader.fail(start, "no ticks in a quarter note");
+      reader.fail(start, "the number of ticks per quarter note is 0");
     }
     return {.ticks_per_quarter = static_cast<double>(division)};
   }
@@ -198,7 +199,7 @@ Division read_division(Reader& reader) {
   const std::uint32_t ticks = division & 0xffU;
   const bool is_known = frames == 24 || frames == 25 || frames == 29 || frames == 30;
   if (!is_known || ticks == 0) {
-    reader.fail(start, "expected 24, 25, 29 or 30 SMPTE frames a second, each of some ticks");
+    reader.fail(start, "expected 24, 25, 29 or 30 SMPTE frames per second with at least one tick");
     return {};
   }
   const double frames_per_s = frames == 29 ? 30000.0 / 1001.0 : frames;  // 29: 30 drop frame
@@ -214,16 +215,16 @@ bool is_chunk(Bytes type, std::string_view name) {
 Result<MidiFile> parse_midi_file(Bytes file) {
   Reader reader(file, 0, file.size());
   if (!is_chunk(reader.take(4, "the header"), "MThd")) {
-    return Error{"byte 0: expected MThd, with which a MIDI file begins"};
+    return Error{"byte 0: expected MThd, the start of a MIDI file"};
   }
   const std::uint32_t header_bytes = reader.number(4, "the header");
   const std::size_t header = reader.at();
   const std::uint32_t type = reader.number(2, "the header");
   const std::uint32_t tracks = reader.number(2, "the header");
   if (!reader.failure() && (header_bytes < 6 || type > 1)) {
-    reader.fail(header, header_bytes < 6
-                            ? "the header has fewer than 6 bytes"
-                            : "type " + std::to_string(type) + "; files of type 0 and 1 are read");
+    reader.fail(header, header_bytes < 6 ? "the header has fewer than 6 bytes"
+                                         : "type " + std::to_string(type) +
+                                               " is not supported; only types 0 and 1 are");
   }
   const Division division = read_division(reader);
   reader.take(header_bytes < 6 ? 0 : header_bytes - 6, "the header");
@@ -235,7 +236,7 @@ Result<MidiFile> parse_midi_file(Bytes file) {
   std::vector<TrackEvent> events;
   for (std::uint32_t track = 0; track < tracks;) {
     if (reader.is_at_end()) {
-      return Error{"byte " + std::to_string(reader.at()) + ": it ends before track " +
+      return Error{"byte " + std::to_string(reader.at()) + ": the file ends before track " +
                    std::to_string(track + 1) + " of " + std::to_string(tracks)};
     }
     const Bytes name = reader.take(4, "the head of a chunk");
@@ -265,7 +266,7 @@ Result<MidiFile> parse_midi_file(Bytes file) {
     midi.length_s += static_cast<double>(event.tick - tick) * tick_s;
     tick = event.tick;
     if (midi.length_s > longest_s) {
-      return Error{"it lasts longer than a day"};
+      return Error{"longer than a day"};
     }
     switch (event.kind) {
       case TrackEvent::Kind::message:
@@ -291,7 +292,7 @@ Result<MidiFile> read_midi_file(const std::string& path) {
   auto midi = parse_midi_file(
       std::span(reinterpret_cast<const std::uint8_t*>(bytes->data()), bytes->size()));
   if (!midi) {
-    return Error{"'" + path + "' is no MIDI file that can be read: " + midi.error().message};
+    return Error{"'" + path + "' is not a valid MIDI file: " + midi.error().message};
   }
   return midi;
 }

@@ -21,26 +21,25 @@ struct MidiFile {
     std::uint32_t first = 0;  // of `bytes`
     std::uint32_t count = 0;
   };
-  std::vector<Message> messages;    // of all tracks, in time; at one time by tracks
-  std::vector<std::uint8_t> bytes;  // theirs, each with its status, as a cable carries them
-  double length_s = 0.0;            // to the last event, the ends of tracks included
+  std::vector<Message> messages;    // of all tracks, sorted by time, then by track
+  std::vector<std::uint8_t> bytes;  // of the messages, each with its status byte
+  double length_s = 0.0;            // to the last event, ends of tracks included
 
   std::span<const std::uint8_t> bytes_of(const Message& message) const {
     return std::span(bytes).subspan(message.first, message.count);
   }
 };
 
-// Channel messages and SysEx, and what tempo changes or frames of SMPTE make of their ticks. Other
-// meta events, chunks of other kinds and what comes after the last track are passed over, and
-// running status lasts beyond meta events, as most writers of files have it. An error says at which
-// byte, from 0, the file is broken; a file of type 2, or longer than a day, is one too. O(n log n)
-// of the file's bytes.
+// Parses channel messages and SysEx and converts ticks to seconds. Ignores other meta events, other
+// chunks, and bytes after the last track. Running status continues after meta events, as most
+// programs write it. Errors have the offset of the wrong byte, from 0. Fails for files of type 2
+// and for files longer than a day. O(n log n) in the size of the file.
 Result<MidiFile> parse_midi_file(std::span<const std::uint8_t> file);
 
-// The same from a file; an error has its name.
+// Reads and parses a file. Errors have its name.
 Result<MidiFile> read_midi_file(const std::string& path);
 
-// Whether a person means such a file by a name: it ends in .mid or .midi, in any case.
+// Returns whether a name ends in .mid or .midi, in upper or lower case.
 bool names_midi_file(std::string_view path);
 
 }  // namespace ressort::commands

@@ -24,8 +24,8 @@ bool MidiPlayer::is_over() const {
   return is_over_;
 }
 
-// Messages carry the times that they should have, not those at which this thread woke: what comes
-// out is as even as the file, as long as it wakes within a period.
+// Stamps messages with their nominal times instead of the times at which this thread wakes up. The
+// output has no jitter as long as the thread wakes up within a period.
 void MidiPlayer::work() {
   MidiReader reader;
   const std::int64_t start_ns = monotonic_ns();

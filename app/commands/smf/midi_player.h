@@ -1,4 +1,4 @@
-// app/commands: a MIDI file as a keyboard that plays by itself.
+// app/commands: plays a MIDI file like a keyboard.
 #pragma once
 
 #include <condition_variable>
@@ -12,13 +12,13 @@ namespace ressort::commands {
 
 class MidiPlayer {
  public:
-  // Starts to play through the door, in a thread of its own. The door must outlive it.
+  // Starts a thread that plays through `door`, which must outlive this object.
   MidiPlayer(MidiFile file, MidiDoor& door);
-  ~MidiPlayer();  // what it has not played is not played
+  ~MidiPlayer();  // stops playing
   MidiPlayer(const MidiPlayer&) = delete;
   MidiPlayer& operator=(const MidiPlayer&) = delete;
 
-  // Whether the last message has been played. [any thread]
+  // Returns whether the last message has been played. [any thread]
   bool is_over() const;
 
  private:
@@ -26,11 +26,11 @@ class MidiPlayer {
 
   MidiFile file_;
   MidiDoor& door_;
-  mutable std::mutex mutex_;  // of the next three
+  mutable std::mutex mutex_;  // guards the next three
   std::condition_variable wake_;
   bool must_end_ = false;
   bool is_over_ = false;
-  std::thread thread_;  // last, so that all else is there when it starts
+  std::thread thread_;  // last, so that it starts after all members exist
 };
 
 }  // namespace ressort::commands

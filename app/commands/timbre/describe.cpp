@@ -9,6 +9,7 @@
 #include "app/commands/body/recording.h"
 #include "app/commands/offline.h"
 #include "app/commands/progress_bar.h"
+#include "app/commands/put_figure.h"
 #include "app/commands/timbre/describe_text.h"
 #include "app/commands/timbre/sweep.h"
 #include "app/exit_code.h"
@@ -35,15 +36,15 @@ bool names_sound(const std::string& name) {
   return std::find(sound_endings().begin(), sound_endings().end(), ending) != sound_endings().end();
 }
 
-// A folder for a sound that is wanted for a moment; it goes with what is in it.
+// A temporary folder for a rendered sound.
 class TemporaryFolder {
  public:
   static Result<TemporaryFolder> make() {
     std::error_code error;
     std::string path = (fs::temp_directory_path(error) / "ressort-XXXXXX").string();
     if (error || mkdtemp(path.data()) == nullptr) {
-      return Error{"no folder can be made in '" + fs::path(path).parent_path().string() +
-                   "' for what is rendered"};
+      return Error{"cannot create a folder in '" + fs::path(path).parent_path().string() +
+                   "' for the rendered sound"};
     }
     return TemporaryFolder(std::move(path));
   }
@@ -62,13 +63,13 @@ class TemporaryFolder {
   std::string path_;
 };
 
-// What was told of a file that nobody knows, of what is in it.
+// Replaces the name of a temporary file in a message.
 std::string renamed(std::string message, const std::string& path, const std::string& name) {
   const std::size_t at = message.find(path);
   return at == message.npos ? message : message.replace(at, path.size(), name);
 }
 
-// Of a sound file, with its modes if they are wanted. That nothing rings in it is only told.
+// Analyses a sound file and, on request, its modes. Only warns if it has no modes.
 Result<Description> describe_file(const std::string& path, const DescribeOptions& options,
                                   const DescriptionProgress& progress) {
   auto description = describe_sound(path, options.how, progress);
@@ -122,7 +123,7 @@ Result<Description> describe_note(const DescribeOptions& options, const Progress
   }
   if (rendered->peak == 0.0) {
     return Error{rendered->name + " is silent at key " + std::to_string(options.key) +
-                 "; try another --note"};
+                 "; pass another --note"};
   }
   auto description =
       describe_file(path, options, [&](double share) { return progress(0.5 + 0.5 * share); });
@@ -170,9 +171,10 @@ Result<Description> describe_model(const DescribeOptions& options,
     return modes.error().message == stopped ? Error{description_stopped} : at_model(modes.error());
   }
   if (!modes->is_linear() || has_waveguide(scene->network)) {
-    return Error{"'" + options.name +
-                 "' is not linear, so how it sounds depends on how it is played: render it with a "
-                 "score, and describe that file"};
+    return Error{
+        "'" + options.name +
+        "' is not linear, so its sound depends on how it is played; render it with a score "
+        "and describe that file"};
   }
   if (const auto warning = instability(*scene, values, options.rate_hz, loading)) {
     warn(to_string(*warning));
@@ -195,7 +197,8 @@ Result<Description> description_of(const DescribeOptions& options,
   }
   return options.settings.empty()
              ? describe_file(options.name, options, progress)
-             : Error{"'" + options.name + "' is a sound file, which has no parameters to set"};
+             : Error{"'" + options.name +
+                     "' is a sound file and has no parameters; --set needs a model"};
 }
 
 int describe(const DescribeOptions& options, const std::function<bool()>& goes_on) {
@@ -209,6 +212,9 @@ int describe(const DescribeOptions& options, const std::function<bool()>& goes_o
       return refuse("-o: expected a file that ends in .svg" +
                     std::string(options.swept.empty() ? "" : " or .csv") + ", found '" + output +
                     "'");
+    }
+    if (auto found = plot::check_gnuplot(); !is_table && !found) {
+      return refuse(output + ": " + found.error().message);
     }
     const std::string read[] = {options.name};
     if (auto spared = spare(output, read); !spared) {
@@ -237,8 +243,8 @@ int describe(const DescribeOptions& options, const std::function<bool()>& goes_o
     return refuse(description.error().message);
   }
   for (const std::string& output : options.outputs) {
-    const std::string picture = description_svg(*description, options.how);
-    if (const int code = put_text(output, picture, options.force)) {
+    const plot::Figure figure = description_figure(*description, options.how);
+    if (const int code = put_figure(output, figure, options.force)) {
       return code;
     }
   }

@@ -1,5 +1,4 @@
-// app/commands: what a sound file, a model or a preset sounds like, in figures. The exit code comes
-// back.
+// app/commands: measures the timbre of a sound file, a model or a preset.
 #pragma once
 
 #include <functional>
@@ -13,7 +12,7 @@
 
 namespace ressort::commands {
 
-// A parameter that goes from one value to another in so many steps, by equal ratios or differences.
+// A range of a parameter, in steps of equal ratios or differences.
 struct SweptParameter {
   std::string name;
   double first = 0.0;
@@ -22,7 +21,7 @@ struct SweptParameter {
   bool by_ratios = false;
 };
 
-// What a figure is said to be, as a formula of what is swept, to be drawn beside what it is.
+// A formula of the swept parameters that is plotted beside a figure.
 struct FigureLaw {
   std::string figure;
   std::string formula;
@@ -30,29 +29,29 @@ struct FigureLaw {
 
 struct DescribeOptions {
   std::string name;  // a sound file, a model or a preset
-  // An .svg; of a sweep a .csv as well or instead. Empty: none; of a sweep a table to stdout.
+  // .svg files; of a sweep also .csv files. Empty: none, or the table of a sweep on stdout.
   std::vector<std::string> outputs;
-  bool force = false;  // write over a file that is there
+  bool force = false;  // overwrites existing files
   bool as_json = false;
   DescriptionOptions how;
-  std::size_t modes = 0;     // of a sound: as many as are looked for, to tell their T60
-  double rate_hz = 44100.0;  // of models and presets, as render has it
-  int key = 57;              // of presets: the note that is rendered,
-  double seconds = 3.0;      // for so long; it is held for two thirds of that
+  std::size_t modes = 0;     // of a sound file: number of modes whose T60 is printed
+  double rate_hz = 44100.0;  // of models and presets
+  int key = 57;              // of presets: the rendered note
+  double seconds = 3.0;      // of presets: length; the key is held for two thirds
   std::optional<ThirdArgument> third;
   std::vector<Setting> settings;      // of a model or a preset
-  std::vector<SweptParameter> swept;  // not empty: all of their values with each other
-  std::vector<std::string> figures;   // that the picture of a sweep shows
-  std::vector<FigureLaw> laws;        // the same
+  std::vector<SweptParameter> swept;  // all combinations of their values
+  std::vector<std::string> figures;   // plotted for a sweep
+  std::vector<FigureLaw> laws;        // plotted for a sweep
 };
 
-// Of one sound; `progress` answers false to stop, `warn` gets what a person should know.
+// Analyses one sound. `progress` returns false to stop; `warn` gets warnings.
 Result<Description> description_of(const DescribeOptions& options,
                                    const DescriptionProgress& progress,
                                    const std::function<void(const std::string&)>& warn);
 
-// A sound file is read as it is. A preset is rendered, one note. A model without a preset is told
-// from its modes, if it is linear. `goes_on` answers false to stop. [main]
+// Analyses a sound file, one rendered note of a preset, or the modes of a linear model. `goes_on`
+// returns false to stop. Returns the exit code. [main]
 int describe(const DescribeOptions& options, const std::function<bool()>& goes_on);
 
 }  // namespace ressort::commands

@@ -18,7 +18,7 @@ json number(std::optional<double> value) {
   return value && std::isfinite(*value) ? json(*value) : json();
 }
 
-// Figures of one name, as the tristimulus' three, are an array; of none at all, null.
+// Figures of equal names, such as the tristimulus, form an array. Missing figures are null.
 void put_figures(json& object, const FigureValues& values) {
   const auto figures = timbre_figures();
   for (std::size_t i = 0; i < figures.size(); ++i) {
@@ -88,7 +88,7 @@ void print_json(const Description& description, const DescriptionOptions& option
   put_figures(spread, statistics.interquartile_range);
   head["interquartile_range"] = std::move(spread);
   std::string text = dumped(head);
-  text.pop_back();  // its brace: the frames are still to come
+  text.pop_back();  // the closing brace, before the frames
   std::printf("%s,\"frames\":[", text.c_str());
   const char* between = "\n";
   for (const DescribedFrame& frame : description.frames) {

@@ -13,12 +13,12 @@ namespace ressort::commands {
 namespace {
 
 constexpr std::size_t block_frames = 4096;
-constexpr double quietest_share = 1e-3;       // of the loudest frame; what is less is not counted
-constexpr double longest_modal_s = 60.0;      // of modes
+constexpr double quietest_share = 1e-3;       // of the loudest frame; softer frames are not counted
+constexpr double longest_modal_s = 60.0;      // of a sound in closed form
 constexpr long long most_frames = 4'000'000;  // eleven hours at 48 kHz, and 1.4 GB
 constexpr double envelope_rate_hz = 1000.0;
 
-// The mean of all channels, block by block.
+// Reads the mean of all channels, block by block.
 class MonoReader {
  public:
   static Result<MonoReader> open(const std::string& path) {
@@ -31,7 +31,7 @@ class MonoReader {
   long long frames() const { return file_.frames(); }
   long long read_so_far() const { return at_; }
 
-  // Empty at the end. The error: a number that is none.
+  // Reads a block; empty at the end. Fails at a sample that is not a number.
   Result<std::span<const double>> next() {
     const std::size_t got = file_.read(interleaved_.data(), block_frames);
     const std::size_t channels = file_.channels();
@@ -64,7 +64,7 @@ class MonoReader {
   long long at_ = 0;
 };
 
-// The stretch of so many samples with the most energy, among those that begin where the last ended.
+// Finds the loudest of consecutive stretches of equal length.
 class LoudestStretch {
  public:
   explicit LoudestStretch(std::size_t samples) : wanted_(samples) {}
@@ -76,7 +76,7 @@ class LoudestStretch {
       }
     }
   }
-  // Of a sound that is shorter, all of it.
+  // Returns the whole sound if it is shorter.
   const std::vector<double>& get() {
     if (loudest_.empty()) {
       end();
@@ -117,8 +117,8 @@ Error too_short(const std::string& path, long long samples, const DescriptionOpt
                           counted(static_cast<std::size_t>(samples), "sample", "samples") + ", ";
   const std::string frame = "a frame of " + std::to_string(options.frame);
   return {options.at ? has + "and " + frame + " at " + std::to_string(*options.at) +
-                           " does not lie within them"
-                     : has + "less than " + frame + "; give a shorter --frame"};
+                           " is not within the sound"
+                     : has + "less than " + frame + "; pass a shorter --frame"};
 }
 
 void keep_frame(Description& description, double& loudest, std::size_t at,
@@ -131,7 +131,7 @@ void keep_frame(Description& description, double& loudest, std::size_t at,
   }
 }
 
-// One frame, and the one before it for their flux.
+// Analyses a frame, with the previous one for the spectral flux.
 Result<Description> describe_frame(const std::string& path, MonoReader& sound, long long at,
                                    const DescriptionOptions& options, Description description) {
   const auto hop = static_cast<long long>(options.hop);
@@ -169,7 +169,7 @@ Result<Description> describe_frame(const std::string& path, MonoReader& sound, l
   return description;
 }
 
-// [figure] The value below which so much of all frames is, between two of them on a line.
+// Returns a quantile of each figure over the frames, linearly interpolated.
 double quantile(std::vector<double>& values, double share) {
   const double place = share * static_cast<double>(values.size() - 1);
   const auto low = static_cast<std::ptrdiff_t>(place);
@@ -228,7 +228,7 @@ Result<Description> describe_sound(const std::string& path, const DescriptionOpt
                            1;
   if (frame_count > most_frames) {
     return Error{"'" + path + "' has " + std::to_string(frame_count) + " frames, more than " +
-                 std::to_string(most_frames) + "; give a larger --hop"};
+                 std::to_string(most_frames) + "; pass a larger --hop"};
   }
   if (!description.f0_hz) {
     description.f0_hz = find_f0(loudest_stretch.get(), description.rate_hz);
@@ -264,7 +264,7 @@ Result<Description> describe_sound(const std::string& path, const DescriptionOpt
   }
   again.end();
   if (second->read_so_far() != description.samples) {
-    return Error{"'" + path + "' changed while it was read"};
+    return Error{"'" + path + "' changed while it was being read"};
   }
   description.temporal = times.shape(description.rate_hz);
   return description;
@@ -283,7 +283,7 @@ Result<Description> describe_modes(const NetworkModes& modes, const DescriptionO
     loudest_mode = std::max(loudest_mode, level);
   }
   if (loudest_mode == 0.0) {
-    return Error{"no mode is heard from its first input at its first output"};
+    return Error{"no mode is heard from the first input to the first output"};
   }
   for (const DecayingPartial& partial : partials) {
     if (!description.f0_hz && partial.residue > quietest_share * loudest_mode) {

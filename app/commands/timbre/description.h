@@ -1,4 +1,4 @@
-// app/commands: what a sound or a model is like, frame by frame and as a whole.
+// app/commands: timbre figures of a sound or a model, per frame and as a whole.
 #pragma once
 
 #include <cstddef>
@@ -20,50 +20,50 @@ struct DescriptionOptions {
   std::size_t hop = 512;
   Window window = Window::hann;
   SpectrumKind kind = SpectrumKind::magnitude;
-  std::optional<long long> at;  // the first sample of the one frame that is described
-  std::optional<double> f0_hz;  // without it, what is found
+  std::optional<long long> at;  // first sample of the only frame; empty: all frames
+  std::optional<double> f0_hz;  // empty: estimated
 };
 
 struct DescribedFrame {
-  std::size_t at = 0;  // its first sample
+  std::size_t at = 0;  // first sample
   FigureValues values;
 };
 
 struct DescribedMode {
   double frequency_hz = 0.0;
-  double t60_s = 0.0;  // infinity: nothing damps it
+  double t60_s = 0.0;  // infinity: undamped
 };
 
 struct Description {
-  std::string of;  // what was described, for people
+  std::string of;  // name, for people
   double rate_hz = 0.0;
-  std::size_t channels = 0;  // of which it is the mean; 0: it is in closed form
+  std::size_t channels = 0;  // number of averaged channels; 0: closed form
   long long samples = 0;
   std::optional<double> f0_hz;
   std::vector<DescribedFrame> frames;
-  std::optional<TemporalShape> temporal;  // nothing of one frame alone
-  std::vector<DescribedMode> modes;       // where it is in closed form, or they were looked for
-  // Of the loudest frame: [bin], or of closed forms [line].
+  std::optional<TemporalShape> temporal;  // empty if there is only one frame
+  std::vector<DescribedMode> modes;       // in closed form or on request
+  // Spectrum of the loudest frame, [bin], or [line] in closed form.
   std::vector<double> frequencies_hz;
-  std::vector<double> spectrum;  // as `kind` says
-  std::size_t loudest = 0;       // its index in `frames`
+  std::vector<double> spectrum;  // magnitude or power
+  std::size_t loudest = 0;       // index of the loudest frame
 };
 
-// Gets 0..1 now and then; answers false to stop.
+// Gets the finished share; returns false to stop.
 using DescriptionProgress = std::function<bool(double share)>;
 inline constexpr const char* description_stopped = "interrupted";
 
-// Of a sound file, the mean of its channels, read block by block, twice. The error says what is
-// wrong with it: unreadable, too short for a frame, numbers that are none.
+// Analyses the mean of the channels of a sound file in two passes. Fails if the file is unreadable,
+// shorter than a frame, or has samples that are not numbers.
 Result<Description> describe_sound(const std::string& path, const DescriptionOptions& options,
                                    const DescriptionProgress& progress);
 
-// Of a linear model: of its modes in closed form, as an impulse at its first input and its first
-// output have them. Frames until all is 60 dB below the first, a minute at most. The error says
-// that nothing is heard.
+// Analyses a linear model in closed form: its response at the first output to an impulse at the
+// first input, until it has decayed by 60 dB, at most a minute. Fails if the response is silent.
 Result<Description> describe_modes(const NetworkModes& modes, const DescriptionOptions& options);
 
-// The quartiles over the frames within 60 dB of the loudest; [figure] absent where no frame has it.
+// Computes quartiles over the frames within 60 dB of the loudest; empty for figures that no frame
+// has.
 struct FigureStatistics {
   FigureValues median;
   FigureValues interquartile_range;

@@ -27,16 +27,16 @@ namespace {
 using json = nlohmann::ordered_json;
 
 constexpr int usual_key = 57;
-constexpr double near_f0 = 0.03;  // a mode that is the pitch
+constexpr double near_f0 = 0.03;  // tolerance of the mode at the pitch
 
-// What a sound file is like, as far as it may be asked for.
+// Targets taken from a sound file.
 struct Liked {
   std::vector<TimbreTarget> targets;
   std::optional<double> f0_hz;
   double rate_hz = 0.0;
 };
 
-// That of its loudest frame, as a model is described by the first after a blow.
+// Of the loudest frame; a model is described by the first frame after a strike.
 Result<Liked> liked(const std::string& path, const Progress& progress,
                     const std::function<bool()>& goes_on) {
   const auto sound = describe_sound(path, {}, [&](double) { return goes_on(); });
@@ -57,7 +57,7 @@ Result<Liked> liked(const std::string& path, const Progress& progress,
   }
   const auto found = identify_recording(path, {.most_modes = 40}, progress);
   if (!found) {
-    std::fprintf(stderr, "%s: no modes, so no T60 is asked for\n", found.error().message.c_str());
+    std::fprintf(stderr, "%s: no modes, so T60 is not a target\n", found.error().message.c_str());
     return like;
   }
   const IdentifiedMode* pitch = nullptr;
@@ -136,7 +136,7 @@ Result<std::string> preset_of(const Scene& scene, const Instrument& instrument,
                      changes);
 }
 
-// The key whose pitch is the nearest.
+// Returns the key with the nearest pitch.
 int key_near(double f0_hz, const Preset& preset) {
   const double key = 69.0 + 12.0 * std::log2(f0_hz / preset.a4_hz) - preset.transpose;
   return static_cast<int>(std::lround(std::clamp(key, 0.0, 127.0)));
@@ -152,7 +152,7 @@ int shape_model(const ShapeOptions& options, const std::function<bool()>& goes_o
     return was_stopped ? exit_code::our_failure : exit_code::wrong_use;
   };
   if (options.targets.empty() && options.like.empty()) {
-    return refuse("nothing is asked for; give a figure, as --centroid 1800, or --like FILE.wav");
+    return refuse("no target; pass a figure, such as --centroid 1800, or --like FILE.wav");
   }
   if (!options.output.empty() && !options.output.ends_with(".toml")) {
     return refuse("-o: expected a file that ends in .toml, found '" + options.output + "'");
@@ -171,7 +171,7 @@ int shape_model(const ShapeOptions& options, const std::function<bool()>& goes_o
   if (auto spared = spare(options.output, read); !spared) {
     return refuse(spared.error().message);
   }
-  std::optional<NewFile> output;  // before the search, which may take its time
+  std::optional<NewFile> output;  // opened before the search, which may be slow
   if (!options.output.empty()) {
     auto file = NewFile::open(options.output, options.force ? Existing::replace : Existing::refuse);
     if (!file) {
@@ -230,7 +230,7 @@ int shape_model(const ShapeOptions& options, const std::function<bool()>& goes_o
        .key = options.key.value_or(like.f0_hz ? key_near(*like.f0_hz, scene->preset) : usual_key),
        .rate_hz = rate_hz,
        .progress = Progress([&](std::string_view) { return goes_on(); }),
-       .tell = [&](double share) { bar->show(share, "looking for the timbre of " + scene->name); }},
+       .tell = [&](double share) { bar->show(share, "searching the timbre of " + scene->name); }},
       targets);
   bar.reset();
   if (!shaped) {
@@ -259,7 +259,8 @@ int shape_model(const ShapeOptions& options, const std::function<bool()>& goes_o
     std::printf("%s = %.6g\n", one.name.c_str(), one.value);
   }
   if (!options.output.empty()) {
-    std::printf("%s: 'ressort play %s' plays it\n", options.output.c_str(), options.output.c_str());
+    std::printf("%s: play it with 'ressort play %s'\n", options.output.c_str(),
+                options.output.c_str());
   }
   return exit_code::done;
 }

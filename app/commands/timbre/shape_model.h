@@ -1,5 +1,4 @@
-// app/commands: a model or a preset turned to the timbre that is asked for. The exit code comes
-// back.
+// app/commands: adjusts the parameters of a model or a preset to reach a target timbre.
 #pragma once
 
 #include <functional>
@@ -14,18 +13,18 @@
 namespace ressort::commands {
 
 struct ShapeOptions {
-  std::string name;    // a preset or a model
-  std::string output;  // a .toml; empty: it is told alone
-  bool force = false;  // write over a file that is there
+  std::string name;    // preset or model
+  std::string output;  // .toml; empty: only prints the result
+  bool force = false;  // overwrites an existing file
   bool as_json = false;
-  std::vector<TimbreTarget> targets;  // instead of what the sound file has
-  std::string like;                   // a sound file; empty: none
-  std::optional<int> key;             // of presets; without it A3, or the sound file's
-  std::optional<double> rate_hz;      // without it 44100, or the sound file's
+  std::vector<TimbreTarget> targets;  // override those of the sound file
+  std::string like;                   // sound file; empty: none
+  std::optional<int> key;             // of presets; empty: A3, or the sound file's
+  std::optional<double> rate_hz;      // empty: 44100, or the sound file's
   std::optional<ThirdArgument> third;
 };
 
-// `goes_on` answers false to stop. [main]
+// `goes_on` returns false to stop. Returns the exit code. [main]
 int shape_model(const ShapeOptions& options, const std::function<bool()>& goes_on);
 
 }  // namespace ressort::commands

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "app/commands/progress_bar.h"
+#include "app/commands/put_figure.h"
 #include "app/exit_code.h"
 #include "app/session/files.h"
 #include "app/session/timbre/timbre_figures.h"
@@ -17,7 +18,7 @@ namespace ressort::commands {
 namespace {
 
 constexpr int most_steps = 10'000;
-constexpr double same_mode = 0.03;  // of a frequency
+constexpr double same_mode = 0.03;  // tolerance of a frequency
 
 std::vector<std::string> words_of(const std::string& text, char between) {
   std::vector<std::string> words(1);
@@ -55,7 +56,7 @@ std::vector<std::string> figure_names() {
   return names;
 }
 
-// The T60 of the mode that is the pitch, of a sound in closed form.
+// Returns the T60 of the mode at the pitch, in closed form.
 std::optional<double> t60_of_pitch(const Description& description) {
   for (const DescribedMode& mode : description.modes) {
     if (description.f0_hz && std::fabs(mode.frequency_hz / *description.f0_hz - 1.0) < same_mode) {
@@ -105,13 +106,13 @@ Result<SweptParameter> parse_swept(const std::string& text) {
   };
   const std::size_t equals = text.find('=');
   if (equals == text.npos || equals == 0) {
-    return wrong("no parameter is named");
+    return wrong("the name of the parameter is missing");
   }
   SweptParameter swept{.name = text.substr(0, equals)};
   const std::vector<std::string> words = words_of(text.substr(equals + 1), ':');
   if (words.size() < 2 || !parse_number(words[0], swept.first) ||
       !parse_number(words[1], swept.last)) {
-    return wrong("no range is given");
+    return wrong("the range is missing");
   }
   swept.by_ratios = is_wide(std::min(swept.first, swept.last), std::max(swept.first, swept.last));
   for (std::size_t i = 2; i < words.size(); ++i) {
@@ -122,12 +123,12 @@ Result<SweptParameter> parse_swept(const std::string& text) {
                steps >= 2.0 && steps <= most_steps) {
       swept.steps = static_cast<int>(steps);
     } else {
-      return wrong("'" + words[i] + "' is neither 2 to " + std::to_string(most_steps) +
-                   " steps nor log or linear");
+      return wrong("'" + words[i] + "' is neither a number of steps from 2 to " +
+                   std::to_string(most_steps) + " nor log or linear");
     }
   }
   if (swept.by_ratios && !(swept.first > 0.0 && swept.last > 0.0)) {
-    return wrong("equal ratios need numbers above 0");
+    return wrong("log needs numbers above 0");
   }
   return swept;
 }
@@ -169,11 +170,11 @@ int sweep(const DescribeOptions& options, const std::function<bool()>& goes_on) 
   const auto pictures = std::count_if(options.outputs.begin(), options.outputs.end(),
                                       [](const auto& path) { return path.ends_with(".svg"); });
   if (options.as_json) {
-    return refuse("--json: a sweep writes CSV");
+    return refuse("--json: not available with --sweep, which writes CSV");
   }
-  // What is wrong with a picture is told before the work.
-  if (auto picture = sweep_svg(table, options); pictures > 0 && !picture) {
-    return refuse(picture.error().message);
+  // Checks the figure before the work starts.
+  if (auto figure = sweep_figure(table, options); pictures > 0 && !figure) {
+    return refuse(figure.error().message);
   }
   std::size_t count = 1;
   for (const SweptParameter& one : options.swept) {
@@ -225,8 +226,9 @@ int sweep(const DescribeOptions& options, const std::function<bool()>& goes_on) 
   }
   const std::string csv = to_csv(table, options.swept);
   for (const std::string& output : options.outputs) {
-    const std::string text = output.ends_with(".csv") ? csv : *sweep_svg(table, options);
-    if (const int code = put_text(output, text, options.force)) {
+    if (const int code = output.ends_with(".csv")
+                             ? put_text(output, csv, options.force)
+                             : put_figure(output, *sweep_figure(table, options), options.force)) {
       return code;
     }
   }

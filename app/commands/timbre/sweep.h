@@ -1,4 +1,4 @@
-// app/commands: how figures of timbre go while parameters of a preset or a model are swept.
+// app/commands: timbre figures over the parameters of a preset or a model.
 #pragma once
 
 #include <functional>
@@ -7,14 +7,15 @@
 #include <vector>
 
 #include "app/commands/timbre/describe.h"
+#include "app/plot/plot.h"
 #include "core/result.h"
 
 namespace ressort::commands {
 
-// "NAME=LOW:HIGH", and ":STEPS", ":log" or ":linear" after it; by equal ratios where the range is
-// wide, unless it says how.
+// Parses "NAME=LOW:HIGH", followed by ":STEPS", ":log" or ":linear". Wide ranges are logarithmic by
+// default.
 Result<SweptParameter> parse_swept(const std::string& text);
-// "FIGURE=FORMULA"; without looking at either.
+// Splits "FIGURE=FORMULA" without parsing either.
 Result<FigureLaw> parse_law(const std::string& text);
 
 struct SweepRow {
@@ -22,22 +23,23 @@ struct SweepRow {
   std::vector<std::optional<double>> figures;  // [figure]
 };
 struct SweepTable {
-  std::string of;                  // for people
-  std::vector<std::string> names;  // of figures
-  std::vector<SweepRow> rows;      // the first of what is swept goes the slowest
+  std::string of;                  // name, for people
+  std::vector<std::string> names;  // of the figures
+  std::vector<SweepRow> rows;      // the first parameter varies slowest
 };
 
-// Names of what is swept and of figures in the first line; nothing between two commas where a sound
-// has no such figure.
+// Returns CSV with the names of parameters and figures in the first line. Missing figures are
+// empty.
 std::string to_csv(const SweepTable& table, const std::vector<SweptParameter>& swept);
 
-// A panel for each figure over the parameter that was swept first, a line for each value of the
-// others, the later the darker; laws dashed. The error: a figure or a law that is none.
-Result<std::string> sweep_svg(const SweepTable& table, const DescribeOptions& options);
+// Draws a panel for each figure over the parameter that is swept first, with a line for each value
+// of the others and dashed lines for laws. Fails on an unknown figure and on a law that is no
+// formula.
+Result<plot::Figure> sweep_figure(const SweepTable& table, const DescribeOptions& options);
 
-// As many sounds as there are values. What is told of one is left out if it has been told. Where
-// one cannot be described, its figures are missing; where the first cannot, it ends there.
-// `goes_on` answers false to stop: nothing is written then. The exit code comes back. [main]
+// Analyses a sound for each combination of values. Prints equal warnings once. Sounds that cannot
+// be analysed have no figures; if the first fails, the sweep fails. `goes_on` returns false to stop
+// without writing. Returns the exit code. [main]
 int sweep(const DescribeOptions& options, const std::function<bool()>& goes_on);
 
 }  // namespace ressort::commands

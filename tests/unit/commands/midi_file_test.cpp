@@ -124,16 +124,16 @@ TEST_CASE("a broken MIDI file is told with its byte", "[midi_file]") {
   CHECK(contains(failure(header(0, 1, 96)), "byte 14: it ends before track 1 of 1"));
   const Bytes head = header(0, 1, 96);  // 14 bytes, the track's events begin at 22
   CHECK(
-      contains(failure(head + Bytes{'M', 'T', 'r', 'k', 0, 0, 0, 9, 0}), "it ends within a chunk"));
+      contains(failure(head + Bytes{'M', 'T', 'r', 'k', 0, 0, 0, 9, 0}), "the file ends within a chunk"));
   CHECK(contains(failure(head + track({0, 60, 1})), "byte 23: a data byte"));
   CHECK(contains(failure(head + track({0, 0x90, 60, 0x90})), "byte 25: a status"));
   CHECK(
-      contains(failure(head + track({0, 0x90, 60})), "byte 25: it ends within a channel message"));
+      contains(failure(head + track({0, 0x90, 60})), "byte 25: the file ends within a channel message"));
   CHECK(contains(failure(head + track({0, 0xf4})), "byte 23: a status that no file"));
   CHECK(contains(failure(head + track({0x81, 0x82, 0x83, 0x84, 0})), "byte 22: the time"));
   CHECK(contains(failure(head + track({0, 0xff, 0x51, 2, 1, 1})), "byte 23: a tempo"));
   CHECK(contains(failure(head + track({0, 0xff, 0x51, 3, 0, 0, 0})), "byte 23: a tempo"));
-  CHECK(contains(failure(head + track({0, 0xf0, 0x7f, 1})), "it ends within a SysEx"));
+  CHECK(contains(failure(head + track({0, 0xf0, 0x7f, 1})), "the file ends within a SysEx"));
   // 2^28 - 1 ticks of a second each.
   CHECK(contains(failure(header(0, 1, 1) + track({0, 0xff, 0x51, 3, 0xff, 0xff, 0xff,  //
                                                   0xff, 0xff, 0xff, 0x7f, 0x90, 1, 1})),

@@ -79,15 +79,17 @@ TEST_CASE("The figures for programs are those that were found", "[recording_text
 
 TEST_CASE("The picture has a mark and a bar for each mode", "[recording_text]") {
   const Identification found = identified({ringing(known, 1.0)});
-  const std::string svg = recording_picture(found, "a <b> & c");
-  CHECK(svg.find("a &lt;b&gt; &amp; c: 3 modes") != std::string::npos);
-  std::size_t marks = 0;
-  for (std::size_t at = svg.find("<circle"); at != svg.npos; at = svg.find("<circle", at + 1)) {
-    ++marks;
-  }
-  CHECK(marks == 3);
-  CHECK(svg.find("nan") == std::string::npos);
-  CHECK(svg.find("inf") == std::string::npos);
+  const plot::Figure figure = recording_figure(found, "a <b> & c");
+  CHECK(figure.title == "a <b> & c: 3 modes");
+  REQUIRE(figure.panels.size() == 3);
+  const auto rows_of = [&](std::size_t panel, std::size_t series) {
+    const std::string& data = figure.panels[panel].series[series].data;
+    return std::count(data.begin(), data.end(), '\n');
+  };
+  CHECK(rows_of(0, 1) == 3);
+  CHECK(rows_of(1, 0) == 3);
+  CHECK(rows_of(1, 1) == 3);
+  CHECK(plot::to_script(figure).find("NaN") == std::string::npos);
 }
 
 }  // namespace ressort::recording_text_test
