@@ -1,4 +1,4 @@
-// What every force law must hold, whatever law is added: its facts agree with its force.
+// Properties that every force law must have: its facts must agree with its force.
 #include "core/laws/laws.h"
 
 #include <cmath>
@@ -23,14 +23,14 @@ template <class Use>
 void each_law(Use&& use) {
   for (std::size_t i = 0; i < law_count; ++i) {
     with_law_type(static_cast<Law>(i), [&]<class Type>(Type type) {
-      Random random(100 + i);  // of its own: another law changes nothing here
+      Random random(100 + i);  // so that a new law does not change the others' values
       INFO(type.facts.name);
       use(type, random);
     });
   }
 }
 
-// Any arguments that a musician might give.
+// Returns random arguments within musical ranges.
 LawNumbers any_arguments(const LawFacts& law, Random& random) {
   LawNumbers values{};
   for (std::size_t i = 0; i < law.count; ++i) {
@@ -61,7 +61,7 @@ auto law_with(const LawNumbers& values) {
   return law_of<Type, double>([&](std::size_t i) { return values[i]; });
 }
 
-// What a link holds by its discrete gradient from one sample to the next.
+// Returns the energy that a link stores by its discrete gradient between two samples.
 template <class ForceLaw>
 double held(const ForceLaw& law, double now, double before) {
   if constexpr (ForceLaw::facts.contains_spring && ForceLaw::facts.is_curved) {
@@ -131,7 +131,7 @@ TEST_CASE("the slopes of every law reach their bounds and do not exceed them", "
         }
       }
       // A clipped law is steepest at one point, which no draw meets; and of a law with several
-      // shapes it is the steepest that counts.
+      // shapes only the steepest reaches the bound.
       if (!type.facts.has(Role::limit) && !type.facts.has(Role::shape)) {
         CHECK(stiffest >= 0.8 * most.stiffness);
         CHECK(most_damped >= 0.99 * most.damping - rounding);
@@ -154,10 +154,10 @@ TEST_CASE("a clipped law has the slope 3 k - 2 s just below its clip", "[laws]")
   const LawNumbers values{s, c, k, 0.0, 0.0};
   CHECK(steepest(Law::clipped_spring, values, values, 0.0).pull == Approx(5.5));
   CHECK(steepest(Law::clipped_contact, values, values, 0.0).pull == Approx(5.5));
-  // A bend that begins late: beyond it, the extra damper weighs more.
+  // A late clip: beyond it the extra damper dominates.
   const LawNumbers flat{1.8, c, k, 0.0, 0.0};
   CHECK(steepest(Law::clipped_spring, flat, flat, 0.0).pull == Approx(1.6 * k));
-  // Without any bend it is a spring of s.
+  // Without a curve it is a spring of stiffness s.
   const LawNumbers straight{s, 0.0, k, 0.0, 0.0};
   CHECK(steepest(Law::clipped_spring, straight, straight, 0.0).pull == s);
   CHECK(steepest(Law::clipped_contact, straight, straight, 0.0).pull == s);
@@ -165,7 +165,7 @@ TEST_CASE("a clipped law has the slope 3 k - 2 s just below its clip", "[laws]")
 
 TEST_CASE("a mass that oscillates forever at the clip of a spring is not reported as stable",
           "[laws]") {
-  // Damped, and yet: near the bend one sample throws it from one side to the other and back.
+  // Although it is damped, near the clip each sample throws the mass to the other side.
   const std::string text =
       "@g ground 0.\n@m massG 1. 0.0783 -0.042 0.\n"
       "@l nlSpringDamper @g @m 0.1 1000. 1.9 0.001\n@out1 posOutput @m\n~motion velocity\n";
@@ -260,7 +260,7 @@ TEST_CASE("a discrete gradient does not create energy", "[laws]") {
       double work = f * way;
       double gained = 2.0 * (held(law, after, link.now) - held(law, link.now, link.before()));
       if constexpr (type.facts.contains_spring && type.facts.is_curved) {
-        work -= (law.k * link.now + law.z * link.speed) * way;  // found as published
+        work -= (law.k * link.now + law.z * link.speed) * way;  // this part is as published
       }
       CAPTURE(link.now, link.speed, link.free, link.gamma, f);
       CHECK(work >= gained - 1e-9);

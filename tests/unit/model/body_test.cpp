@@ -1,4 +1,4 @@
-// Bodies and their modes: what is read, what is told, what is printed, what they are made of.
+// Bodies and their modes: reading, errors, printing, expansion.
 #include <cmath>
 #include <numbers>
 

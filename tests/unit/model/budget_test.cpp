@@ -1,4 +1,4 @@
-// What may be lost for speed, as text.
+// Budgets as text.
 #include "core/model/preset/budget.h"
 #include "core/model/preset/preset.h"
 #include "tests/support/catch.h"

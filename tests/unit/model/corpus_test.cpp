@@ -1,5 +1,5 @@
-// Small models by hand that together use every construct of the language in every dialect: what
-// each is read as, and that it sounds as the textbook has it.
+// Small models that together use every construct of the language in every dialect. Tests how
+// each is read, and that it follows its analytic solution.
 #include <cctype>
 #include <filesystem>
 #include <fstream>
@@ -25,7 +25,7 @@ const std::filesystem::path folder = RESSORT_SOURCE "/tests/corpus";
 
 struct Model {
   const char* name;
-  std::size_t masses;  // that are no points
+  std::size_t masses;  // without points
   std::size_t links;
   std::size_t macros;
   std::size_t points;
@@ -100,8 +100,8 @@ std::string text_of(const std::string& name) {
   return text.str();
 }
 
-// What drives a model: [channel][frame]. Hands wander around where they start, forces are faster,
-// and what only turns parameters stays within 0..1.
+// Returns input signals: [channel][frame]. Positions move slowly around their start, forces faster,
+// and channels of parameters stay within 0..1.
 std::vector<std::vector<double>> excitation(const Network& network) {
   int count = input_count(network);
   for (const Parameter& parameter : network.parameters) {
@@ -130,7 +130,7 @@ std::vector<std::vector<double>> excitation(const Network& network) {
 
 using ChannelSamples = std::vector<std::vector<double>>;  // [channel][frame]
 
-// One tick's values of the model's inputs.
+// Returns one sample of the model's inputs.
 std::vector<double> inputs_at(const Network& network, const ChannelSamples& channels,
                               std::size_t n) {
   std::vector<double> values;
@@ -140,7 +140,7 @@ std::vector<double> inputs_at(const Network& network, const ChannelSamples& chan
   return values;
 }
 
-// One tick's values of its parameters.
+// Returns one sample of its parameters.
 std::vector<double> parameters_at(const Network& network, const ChannelSamples& channels,
                                   std::size_t n) {
   std::vector<double> values = parameter_values(network);
@@ -151,7 +151,7 @@ std::vector<double> parameters_at(const Network& network, const ChannelSamples& 
   return values;
 }
 
-// Adds what `step(n)` gives for every channel to `outputs`.
+// Appends the channels of `step(n)` to `outputs`.
 template <class Step>
 ChannelSamples played(const Network& network, Step&& step) {
   ChannelSamples outputs(static_cast<std::size_t>(output_count(network)));
@@ -238,7 +238,7 @@ TEST_CASE("every model of the corpus is read as described", "[corpus]") {
     CHECK(network.parameters.size() == model.parameters);
     CHECK(network.inputs.size() == model.inputs);
     CHECK(network.outputs.size() == model.outputs);
-    // Where every mass starts at 0, at rest, both meanings are one.
+    // Both meanings agree if every mass starts at 0, at rest.
     CHECK(network.third == (rests_at_zero(network) ? delayed : model.third));
     CHECK(parsed.diagnostics.size() == model.warnings);
   }
@@ -250,7 +250,7 @@ TEST_CASE("every model of the corpus follows its analytic solution", "[corpus]")
     const Network network = support::network_of(text_of(model.name));
     if (std::any_of(network.macros.begin(), network.macros.end(),
                     [](const Macro& macro) { return is_waveguide(macro.kind); })) {
-      continue;  // of which the textbook has none
+      continue;  // no analytic solution
     }
     const ChannelSamples driven = excitation(network);
     const ChannelSamples expected = by_reference(network, driven);

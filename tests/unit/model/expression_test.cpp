@@ -1,4 +1,4 @@
-// Arithmetic in arguments: values, precedence, and what is no expression, to the column.
+// Arithmetic in arguments: values, precedence, and errors with their columns.
 #include "core/model/language/expression.h"
 
 #include <limits>
@@ -108,7 +108,7 @@ TEST_CASE("expressions that are too deep or too long are rejected", "[expression
               "the parentheses are nested too deeply");
   CHECK(value(repeated("abs(", 32) + "1" + repeated(")", 32)) == 1.0);
   CHECK_FALSE(parse_expression(repeated("abs(", 33) + "1" + repeated(")", 33), names));
-  // 1+(1+(1+ ... keeps one more number on the stack with every level.
+  // 1+(1+(1+ ... puts one more number on the stack at each level.
   CHECK(value(repeated("1+(", 31) + "1" + repeated(")", 31)) == 32.0);
   CHECK_FALSE(parse_expression(repeated("1+(", 32) + "1" + repeated(")", 32), names));
   // 256 steps: 128 numbers and 127 operators fit, 129 and 128 do not.
@@ -153,7 +153,7 @@ TEST_CASE("numbers are read and printed independently of the locale, without los
 }
 
 TEST_CASE("random formulas have the expected text and value", "[expression]") {
-  // Random trees, printed with all their parentheses and reckoned on the way.
+  // Random trees, printed with all parentheses and evaluated at the same time.
   support::Random random(8);
   struct Tree {
     std::string text;

@@ -1,5 +1,5 @@
-// Regular shapes: as many points and links as the formulas say, the same networks as the macros,
-// and what cannot be made.
+// Regular shapes: numbers of points and links, equality with macros, and
+// errors.
 #include "core/model/generate.h"
 
 #include <algorithm>
@@ -28,7 +28,7 @@ std::size_t count(const Network& network, MassKind kind) {
                     [&](const Mass& mass) { return mass.kind == kind; }));
 }
 
-// The reach of one mass along the links, in masses.
+// Returns the number of masses that links connect with one mass.
 std::size_t reach(const Network& network) {
   std::vector<std::vector<std::uint32_t>> near(network.masses.size());
   for (const Link& link : network.links) {
@@ -50,7 +50,7 @@ std::size_t reach(const Network& network) {
   return reached;
 }
 
-// What is heard after a unit impulse, by the textbook.
+// Returns the output after a unit impulse, by the reference scheme.
 std::vector<double> by_the_book(const Network& network, std::size_t frames) {
   auto simulation = reference::make_simulation(network, parameter_values(network));
   std::vector<double> heard;
@@ -100,7 +100,7 @@ TEST_CASE("shapes have the documented numbers of points and links", "[generate]"
              Count{ShapeKind::hexagon, FixedPoints::border, hexagon, 6 * n, 9 * n * n + 3 * n},
          }) {
       if (expected.points == expected.held) {
-        continue;  // the smallest triangle is all border
+        continue;  // all points of the smallest triangle are on its border
       }
       const Network network = made({.kind = expected.kind,
                                     .length = n,
@@ -130,7 +130,7 @@ TEST_CASE("inner points of a triangle have six neighbours at equal distances", "
       };
       const double x = std::fabs(place(link.a).x - place(link.b).x);
       const double y = std::fabs(place(link.a).y - place(link.b).y);
-      // Along a row 0.1; from row to row 0.1 and half a step aside.
+      // The distance is 0.1 along a row; rows are 0.1 apart and shifted by half a step.
       CHECK(((std::fabs(x) < 1e-12 && std::fabs(y - 0.1) < 1e-12) ||
              (std::fabs(x - 0.1) < 1e-12 && std::fabs(y - 0.05) < 1e-12)));
     }
@@ -149,7 +149,7 @@ TEST_CASE("a generated shape equals the expanded macro", "[generate]") {
     }
     for (const double air : {0.0, 0.0005}) {
       CAPTURE(static_cast<int>(kind), air);
-      // 11 points, so that the macro's places for in and out are points.
+      // With 11 points, the macro's input and output are at nodes.
       Shape shape{.kind = kind,
                   .length = 11,
                   .width = is_plane(kind) ? 11u : 0u,
@@ -171,7 +171,7 @@ TEST_CASE("a generated shape equals the expanded macro", "[generate]") {
       CHECK(comparison.peak > 0.01);
       CHECK(comparison.worst <= 1e-12);
 
-      // And point by point, link by link.
+      // Compares points and links one by one.
       shape.with_io = false;
       const Network expanded = expand_macros(made(shape));
       shape.as_macro = false;
@@ -219,7 +219,7 @@ TEST_CASE("a generated shape is audible, stable and free of warnings", "[generat
         auto compiled = compile_network(network, default_preset(network, true), {.bare = true});
         REQUIRE(compiled);
         CHECK(compiled->instrument.stiffness_margin >= 1.0);
-        // It rests at 0.25 until it is pushed; then it swings around that, for a second at least.
+        // The shape rests at 0.25 until a push, then oscillates around it for at least a second.
         std::vector<double> push(44100, 0.0);
         push[100] = 0.1;
         std::vector<double> heard(push.size());

@@ -1,4 +1,4 @@
-// Macros and the places on them: golden values, the same network written out, and a moving place
+// Macros and places on them: golden values, the expanded network, and a moving place
 // against the published array algorithm.
 #include <cmath>
 
@@ -22,13 +22,13 @@ double value(const Network& network, ArgumentId id) {
   return argument_value(network, id, parameter_values(network));
 }
 
-// Argument `slot` of the last link.
+// Returns argument `slot` of the last link.
 double link_value(const Network& network, std::size_t slot) {
   return value(network, network.links.back().arguments[slot]);
 }
 
-// One line of appendix A: unit force at tick 0 through the place `in`, heard at `out`. There a
-// force acts one tick after it is given, here on the same; so tick n there is n - 1 here.
+// One line of appendix A: the response at `out` to a unit force at sample 0 at `in`. There a
+// force acts one sample later than here, so sample n there is n - 1 here.
 struct Golden {
   const char* name;
   const char* text;
@@ -73,7 +73,7 @@ TEST_CASE("macros match the golden values of appendix A in every digit", "[macro
     const std::vector<double> heard = struck(golden.text, 1000);
     for (std::size_t i = 0; i < std::size(at); ++i) {
       INFO(golden.name << ", n = " << at[i] << ": " << show(heard[at[i] - 1]));
-      // Nine significant digits; of the one of 1e-15, the three that are printed.
+      // Nine significant digits, or three for the value near 1e-15, as printed.
       const double digits = std::fabs(golden.values[i]) < 1e-12 ? 1e-2 : 1e-8;
       CHECK(std::fabs(heard[at[i] - 1] - golden.values[i]) <=
             0.5 * digits * std::fabs(golden.values[i]) + 1e-30);
@@ -82,7 +82,7 @@ TEST_CASE("macros match the golden values of appendix A in every digit", "[macro
 }
 
 TEST_CASE("a macro equals the same network of masses and links", "[macro]") {
-  // 5 nodes with two fixed; the place 0.25 is node 1, 0.75 is node 3.
+  // 5 nodes, two of them fixed; place 0.25 is node 1, 0.75 is node 3.
   const std::string written =
       "@a ground 0.1\n@b osc 2. 0. z 0.1 0.1\n@c osc 2. 0. z 0.1 0.1\n@d osc 2. 0. z 0.1 0.1\n"
       "@e ground 0.1\n@z param 0.002\n@r0 springDamper @a @b 0.3 0.01\n"
@@ -120,8 +120,8 @@ TEST_CASE("the expansions have the published numbers of nodes and links", "[macr
 }
 
 TEST_CASE("a place that moves at audio rate follows the published array algorithm", "[macro]") {
-  // A finger, sprung to a place that wanders along a chain of 12: positions by 2x - x_before,
-  // weights max(0, 1 - |p - i|), the place's velocity that of its own last position.
+  // A finger on a spring to a place that moves along a chain of 12. Positions by 2x - x_before,
+  // weights max(0, 1 - |p - i|), the velocity from the place's previous position.
   constexpr std::size_t nodes = 12;
   constexpr double mass = 1.3;
   constexpr double k = 0.2;
@@ -147,7 +147,7 @@ TEST_CASE("a place that moves at audio rate follows the published array algorith
   long double finger_before = 0.0L;
   for (std::size_t n = 0; n < frames; ++n) {
     finger[n] = hand(n);
-    coordinate[n] = 0.5 + 0.7 * place(n);  // beyond both ends at times: it is clamped
+    coordinate[n] = 0.5 + 0.7 * place(n);  // sometimes beyond the ends, where it is clamped
     for (std::size_t i = 0; i < nodes; ++i) {
       const long double next = 2 * x[i] - before[i] + force[i] / mass;
       before[i] = x[i];
@@ -227,7 +227,7 @@ TEST_CASE("the number of a macro's arguments determines dialect and air damping"
             (macro.kind == MacroKind::stiff_string ? 9.0 : 0.0));
     }
   }
-  // At rest in a file of the other dialect too.
+  // At rest in a file of the other dialect, too.
   const Network mixed = network_of("@s string 5 2 3 4 0.5\n@m mass 1 [0 0 1] 0\n");
   CHECK(mixed.third == velocity);
   CHECK(mixed.macros[0].third == 0.0);
@@ -272,7 +272,7 @@ TEST_CASE("a place after the arguments does not count as one", "[macro]") {
   n = tapped("@in1 frcInput @q 0:1\n@out1 frcOutput @s 1.");
   CHECK(coordinate(n, 0) == std::pair(0.0, 1.0));
   CHECK(coordinate(n, 1) == std::pair(1.0, 0.0));
-  // The newer dialect's brackets say the same.
+  // Brackets in the newer dialect mean the same.
   CHECK(network_of(macros + "@m ground [0 0 0]\n@l spring [@s p] [@q 0.1 p+0.5] 1 2").links ==
         network_of(macros + "@m ground [0 0 0]\n@l spring @s @q 1 2 p 0.1:p+0.5").links);
   CHECK(coordinate(tapped("@l spring [@s p + 0.1] @a 1"), 0) == std::pair(0.35, 0.0));
@@ -312,7 +312,7 @@ TEST_CASE("a place beyond the end of a macro is clamped, with a warning", "[macr
 }
 
 TEST_CASE("places, grounds and position inputs start at rest", "[macro]") {
-  // Dampers alone: at the first tick nothing has moved, so nothing is felt.
+  // Dampers only: nothing has moved before the first sample, so there is no force.
   support::Bare<double> bare(
       make_program(network_of("@in1 posInput 3\n@g ground -2\n@s chain 5 1 0.1 0 [0 0 1.5] 0\n"
                               "@q closedMesh 4 4 1 0.1 0 [0 0 0.5] [0 0 0]\n"
@@ -328,7 +328,7 @@ TEST_CASE("places, grounds and position inputs start at rest", "[macro]") {
     CHECK(std::fabs(outputs[2] - 1.5) < 1e-14);
     CHECK(std::fabs(outputs[3] - 0.5) < 1e-14);
   }
-  // A string's ends stay where they are, whatever its speed.
+  // The ends of a string stay fixed at any initial velocity.
   const Network moving = expand_macros(network_of("@s string 4 1 0.1 0 0 441"));
   CHECK(initial_velocity(moving, moving.masses[0]) == 0.0);
   CHECK(initial_velocity(moving, moving.masses[1]) == 0.01);
@@ -336,8 +336,8 @@ TEST_CASE("places, grounds and position inputs start at rest", "[macro]") {
 }
 
 TEST_CASE("the force at a place is interpolated, with input forces", "[macro]") {
-  // 3 nodes: 0.25 is between the first two. A push there is felt at half of that on each, so half
-  // of it is felt where it acts, and a quarter at 0.125, which is nearer to the first: 3/4 and 1/4.
+  // 3 nodes: 0.25 is midway between the first two. A push there acts by half on each, so half
+  // of it is measured at the same place. 0.125 has the weights 3/4 and 1/4.
   support::Bare<double> bare(
       make_program(network_of("@s chain 3 1 0 0 0 0\n@in1 frcInput [@s 0.25]\n"
                               "@out1 frcOutput [@s 0.25]\n@out2 frcOutput [@s 0.125]\n"

@@ -1,4 +1,4 @@
-// The .mdl reader: what it accepts, what each form means, and every complaint with its place.
+// The .mdl reader: accepted forms, their meaning, and the position of every error.
 #include "core/model/language/mdl.h"
 
 #include <string>
@@ -26,7 +26,7 @@ std::vector<Diagnostic> said(const ParsedNetwork& parsed, Severity severity) {
   return of_it;
 }
 
-// The value of argument `slot` of the only link.
+// Returns argument `slot` of the only link.
 double link_value(const Network& network, std::size_t slot) {
   return argument_value(network, network.links.at(0).arguments.at(slot), parameter_values(network));
 }
@@ -38,7 +38,7 @@ struct Complaint {
   std::string message;
 };
 
-// The text has exactly one error: this one, at this place.
+// Checks that the text has exactly this one error at this position.
 void check_error(const Complaint& complaint) {
   const ParsedNetwork parsed = parse_network(complaint.text);
   const auto errors = said(parsed, Severity::error);
@@ -56,8 +56,8 @@ void check_error(const Complaint& complaint) {
 TEST_CASE("every keyword accepts only its numbers of arguments", "[mdl]") {
   struct Form {
     std::string start;          // label, keyword and references
-    std::string word;           // as the message names it
-    std::vector<int> accepted;  // counts of arguments after the references
+    std::string word;           // as in the message
+    std::vector<int> accepted;  // numbers of arguments after the references
     int references = 0;
   };
   const std::vector<Form> forms = {
@@ -102,7 +102,7 @@ TEST_CASE("every keyword accepts only its numbers of arguments", "[mdl]") {
         CHECK(errors[0].message.starts_with("'" + form.word + "' takes "));
         CHECK(errors[0].message.find("found " + std::to_string(count + form.references)) !=
               std::string::npos);
-        // At the end of the line where something is missing, at the first one too many else.
+        // The position is the end of the line, or the first surplus argument.
         const int most = form.accepted.back();
         const bool missing = count < form.accepted.front();
         const std::size_t column =
@@ -152,7 +152,7 @@ TEST_CASE("masses, grounds and oscillators are read correctly", "[mdl]") {
   CHECK(network.masses[2].position == -0.2);
   CHECK(network.masses[3].kind == MassKind::position);
   CHECK(network.masses[3].position == 4.0);
-  // Inputs are sorted by number, whatever the order of the lines.
+  // Inputs are sorted by number in any order of the lines.
   REQUIRE(network.inputs.size() == 2);
   CHECK(network.inputs[0].number == 1);
   CHECK(network.inputs[0].is_force);
@@ -238,7 +238,7 @@ TEST_CASE("lines may come in any order and layout", "[mdl]") {
     const Network network = network_of(text);
     CHECK(network == straight);
   }
-  // The lines of a complaint are counted the same way.
+  // Lines are counted in the same way for errors.
   check_error({"#\r\n\r\n@m mass 0 0 0\r\n", 3, 9, "a mass must be above 0, found '0'"});
   check_error({"#\r\r@m mass 0 0 0\r", 3, 9, "a mass must be above 0, found '0'"});
   check_error({"@s chain 9 0.0-2 1 1 0", 1, 12, "a mass must be above 0, found '0.0-2'"});
@@ -334,7 +334,8 @@ TEST_CASE("every error has a line, a column and the expected text", "[mdl]") {
 }
 
 TEST_CASE("reading stops after a hundred errors", "[mdl]") {
-  // Each kind costs the reader most in another way; the test's time limit is what they break.
+  // Each kind is the worst case for another part of the reader. A quadratic algorithm would exceed
+  // the
   std::string unknown_words;
   std::string unknown_masses;
   std::string duplicates;

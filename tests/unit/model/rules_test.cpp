@@ -32,7 +32,7 @@ double value(const Network& network, ArgumentId id) {
   return argument_value(network, id, parameter_values(network));
 }
 
-// Argument `slot` of the last link.
+// Returns argument `slot` of the last link.
 double link_value(const Network& network, std::size_t slot) {
   return value(network, network.links.back().arguments[slot]);
 }
