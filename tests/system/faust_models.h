@@ -12,14 +12,14 @@ namespace ressort::scenes {
 
 using namespace laws;
 
-// A mass between a wall and a link of the given law to what input 2 holds; input 1 pushes it.
+// Returns a mass between a wall and a link to position input 2; input 1 pushes it.
 inline std::string law(const std::string& link) {
   return "@g ground 0.\n@m mass 1.5 0. 0.\n@r springDamper @g @m 0.05 0.002\n@in2 posInput 0.\n"
          "@l " +
          link + "\n@in1 frcInput @m\n@out1 posOutput @m\n@out2 frcOutput @m\n";
 }
 
-// A macro that is pushed at one place and heard at another.
+// Returns a macro with an input at one place and an output at another.
 inline std::string played(const std::string& macro, const std::string& from,
                           const std::string& to) {
   return "@s " + macro + "\n@in1 frcInput [@s " + from + "]\n@out1 posOutput [@s " + to +
@@ -63,7 +63,7 @@ inline std::string on_a_waveguide(const std::string& link) {
          link + "\n@out1 posOutput [@s 0.7]\n@out2 frcOutput @in2\n";
 }
 
-// Every law of the list, between a mass and input 2, and between a waveguide and input 2.
+// Returns models with every law, between a mass and input 2 and between a waveguide and input 2.
 inline std::vector<std::pair<std::string, std::string>> models_of_laws() {
   std::vector<std::pair<std::string, std::string>> all;
   for (const LawFacts& facts : law_table()) {
@@ -160,7 +160,7 @@ inline const std::vector<std::pair<std::string, std::string>>& faust_models() {
        "@in1 frcInput [@s 0.7]\n@in2 posInput 0.\n@in3 frcInput @m\n@in5 frcInput @o\n"
        "@out1 posOutput [@s 0.4]\n@out2 posOutput [@b y]\n@out3 frcOutput @m\n"
        "@out4 posOutput [@e 0.5]\n@out5 posOutput @o\n"},
-      // Gravity and what moves at the start, in both dialects.
+      // Gravity and initial velocities, in both dialects.
       {"older_start",
        "@g ground 0.3\n@m massG 1.2 0.002 1. 0.9\n@o osc 2. 0.1 0.01 0.5 0.45\n"
        "@r spring @g @m 0.05 0.01\n@q spring @m @o 0.02 0.01\n@in1 posInput -0.4\n"
@@ -184,14 +184,14 @@ inline const std::vector<std::pair<std::string, std::string>>& faust_models() {
       {"older_macro",
        "@s string 8 1. 0.3 0.01 0.2\n@in1 posInput 1.\n@c contact @s @in1 0.1 0.01 0.2 0.4\n"
        "@out1 posOutput @s 0.3\n@out2 frcOutput @s 0.5\n"},
-      // Places that a parameter, an expression or a channel gives.
+      // Places at coordinates from parameters, expressions and channels.
       {"places",
        "@p param 0.3\n@q audioParam @in2\n@s string 9 1. 0.3 0.003 0. 0.\n"
        "@me closedMesh 5 5 1. 0.2 0.002 0. 0.\n@in1 frcInput [@s p+0.1]\n@in3 posInput 0.\n"
        "@pick nlPluck @in3 [@s q] 0.1 0.1\n@bridge spring [@s 1.1*p] [@me q p] 0.02 0.001\n"
        "@tie spring [@s 0.4] [@s 0.65] 0.01 0.001\n@out1 posOutput [@s q]\n"
        "@out2 posOutput [@me 0.5+0.4*q q]\n@out3 frcOutput [@me q 0.5]\n@out4 frcOutput @in3\n"},
-      // A channel that turns everything.
+      // A channel that changes everything.
       {"driven",
        "@w audioParam @in2\n@T param 0.1\n@g ground 0.2\n@m mass [1.5+w] [10*w] 0.3 50.\n"
        "@o osc [1.2+0.3*w] [0.1+0.05*w] [0.01+0.004*w] [5*w] 0.1 40.\n"
@@ -199,7 +199,7 @@ inline const std::vector<std::pair<std::string, std::string>>& faust_models() {
        "@l nlSpring3 @m @o [0.05+0.02*w] [0.1*w] 0.001\n@q spring @o @o2 0.03\n"
        "@in1 frcInput @m\n@in3 frcInput @o\n@in2 posInput 0.\n@t spring @in2 @o2 0.01 [0.01*w*w]\n"
        "@out1 posOutput @m\n@out2 posOutput @o\n@out3 posOutput @o2\n@out4 frcOutput @o\n"},
-      // Everything that an expression may hold; names that FAUST has for itself.
+      // All functions of expressions; names that are reserved in FAUST.
       {"expressions",
        "@process param 0.1\n@with param -0.02\n@in param 2\n@rest param 1e-5\n"
        "@import ground 0.\n@mem mass [max(1,in-0.5)] 0. 0.\n@m-x mass [abs(with)*50+pow(in,0.5)] "
@@ -210,7 +210,7 @@ inline const std::vector<std::pair<std::string, std::string>>& faust_models() {
        "@x springDamper @import @m-x [0.05*sin(in)+0.001*cos(in)*in/in*2] [0.001]\n"
        "@in1 frcInput @mem\n@out1 posOutput @m-x\n@out2 posOutput @mem\n"},
       // Channels with gaps, parallel links, lines in any order, a mass without
-      // links, a link from a mass to itself, outputs of what does not move.
+      // links, a link from a mass to itself, outputs of fixed points.
       {"wiring",
        "@out7 posOutput @b\n@in1 frcInput @a\n@in5 frcInput @b\n@l1 spring @a @b 0.05 0.001\n"
        "@l2 spring @b @a 0.03 0.002\n@l3 spring @g @b 0.02 0.001\n@lone mass 3. 0. 0.\n"

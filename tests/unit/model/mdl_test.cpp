@@ -410,7 +410,7 @@ TEST_CASE("huge texts are rejected with an error", "[mdl]") {
                "printed"});
   check_error({"@a mass " + std::string(1'000'000, 'x') + rest, 1, 9,
                "'" + std::string(40, 'x') + "...' is not a parameter of this model"});
-  // A lone CR ends a line, also where the text ends in what is none.
+  // A single CR ends a line, also at the end of invalid text.
   check_error({std::string("@a mass 1 0 0\r@b mass 1 0 0\r\n@c\0", 32), 3, 3,
                "found a zero byte: this is a binary file, not a model"});
 }
@@ -439,7 +439,7 @@ TEST_CASE("labels of any length survive copying the network", "[mdl]") {
     ParsedNetwork parsed = parse_network(text);
     REQUIRE(parsed.ok());
     Network copy = parsed.network;
-    parsed = parse_network(text);  // what the copy's names might still point to is gone
+    parsed = parse_network(text);  // the first network is gone
     CHECK(copy == parsed.network);
     CHECK(copy.masses[0].name == label);
     CHECK(copy.links[0].name == label + "s");

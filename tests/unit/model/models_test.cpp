@@ -1,4 +1,4 @@
-// The instruments that come with the program.
+// The shipped instruments.
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -17,7 +17,7 @@ namespace {
 
 struct Instrument9 {
   const char* name;
-  std::string scene;  // as scenes.h builds it, independently, from the published numbers
+  std::string scene;  // built by scenes.h from the published numbers
 };
 
 const std::vector<Instrument9>& nine() {
@@ -35,7 +35,7 @@ const std::vector<Instrument9>& nine() {
   return all;
 }
 
-// The ends of a network's links by name: what is attached to what, whatever the lines' order.
+// Returns the names of all links' ends, independent of the order of the lines.
 std::multiset<std::tuple<Law, std::string, std::string>> ends(const Network& network) {
   std::multiset<std::tuple<Law, std::string, std::string>> found;
   for (const Link& link : network.links) {
@@ -56,7 +56,7 @@ TEST_CASE("the models are the published networks", "[models]") {
     CHECK(scene->network.masses.size() == expected.masses.size());
     CHECK(ends(scene->network) == ends(expected));
     CHECK(scene->network.inputs.size() == expected.inputs.size());
-    // Where one is published, a second is ours, so that there are two ears.
+    // If a model was published with one output, we added a second one.
     REQUIRE(scene->network.outputs.size() >= expected.outputs.size());
     for (std::size_t i = 0; i < expected.outputs.size(); ++i) {
       CHECK(scene->network.masses[scene->network.outputs[i].mass].name ==
@@ -65,8 +65,8 @@ TEST_CASE("the models are the published networks", "[models]") {
   }
 }
 
-// One loudness for all puts what sounds on and pure at the lower end, a click that echoes at the
-// upper: presets/README.md has the table.
+// At equal loudness, pure sustained sounds have the lowest peaks, and clicks with echoes the
+// highest. presets/README.md has the table.
 TEST_CASE(
     "every preset has two outputs, a forte between -22 and -1 dBFS, and 14 to 34 dB of velocity",
     "[models]") {
@@ -80,10 +80,10 @@ TEST_CASE(
     std::vector<double> levels_db;
     auto compiled = compile_network(scene->network, scene->preset, {});
     REQUIRE(compiled);
-    CHECK(compiled->instrument.stiffness_margin >= 1.0);  // in every corner of the ranges
+    CHECK(compiled->instrument.stiffness_margin >= 1.0);  // at all corners of the ranges
     CHECK(compiled->instrument.outputs == 2);
     for (const double velocity : {20.0, 64.0, 100.0, 127.0}) {
-      const std::size_t frames = 66150;  // a bow takes its time
+      const std::size_t frames = 66150;  // a bow starts slowly
       std::vector<std::vector<double>> channels(
           static_cast<std::size_t>(compiled->instrument.outputs), std::vector<double>(frames));
       std::vector<double*> outputs;

@@ -1,4 +1,4 @@
-// What the third state argument means: who decides, what is said of it, and when there is a doubt.
+// The meaning of the third state argument: how it is decided, reported and doubted.
 #include <string>
 
 #include "core/model/language/mdl.h"
@@ -109,8 +109,8 @@ TEST_CASE("the meaning determines the initial velocity", "[motion]") {
   };
   CHECK(speed("~motion velocity\n@a mass 1 1 441") == 0.01);
   CHECK(speed("~motion delayed\n@a mass 1 1 441") == -440.0);
-  CHECK(speed("~motion delayed\n@a mass 1 1 0") == 1.0);  // as it is written: a jump
-  // A macro that has no motion rests in both meanings.
+  CHECK(speed("~motion delayed\n@a mass 1 1 0") == 1.0);  // a jump, as written
+  // A macro without a motion is at rest in both meanings.
   for (const std::string word : {"velocity", "delayed"}) {
     const Network network = support::network_of("~motion " + word + "\n@s chain 5 1 1 0 3");
     const Macro& macro = network.macros[0];

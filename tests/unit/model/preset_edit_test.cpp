@@ -1,4 +1,4 @@
-// Presets that are written: what was changed is, all else stays as it was typed.
+// Writing presets: edits change values and preserve all other text.
 #include "core/model/preset/edit.h"
 
 #include "tests/support/catch.h"

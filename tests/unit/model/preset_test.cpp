@@ -1,4 +1,4 @@
-// Presets: what is read from one, every complaint with its place, and the preset of no preset.
+// Presets: reading, errors with their positions, and the default preset.
 #include "core/model/preset/preset.h"
 
 #include "app/control/registry.h"
@@ -14,7 +14,7 @@ struct Complaint {
   std::string text;
   int line;
   int column;
-  std::string message;  // its beginning
+  std::string message;  // start of the message
 };
 
 void check_error(const Complaint& complaint) {
@@ -28,7 +28,7 @@ void check_error(const Complaint& complaint) {
   CHECK(error.column == complaint.column);
 }
 
-// A preset whose only control is this; the control's keys stand in line 3.
+// Returns a preset with this control only, whose keys are in line 3.
 std::string with_control(const std::string& keys) {
   return "model = \"x.mdl\"\n[[control]]\n" + keys + "\n";
 }
@@ -185,7 +185,7 @@ TEST_CASE("all sources and gestures are read", "[preset]") {
   CHECK(how("impulse") == Gesture::impulse);
   CHECK(how("hold") == Gesture::hold);
   CHECK(how("parameter") == Gesture::parameter);
-  // Without a word the target tells.
+  // Without `how` the target determines the gesture.
   CHECK(from("note").gesture == Gesture::position);
   CHECK(control_of("from = \"cc1\"\nto = \"m_K\"").gesture == Gesture::parameter);
   CHECK(control_of("from = \"cc1\"\nto = \"inner\"").gesture == Gesture::parameter);
@@ -328,7 +328,7 @@ TEST_CASE("all errors of a preset are reported in order", "[preset]") {
     CHECK(read.errors[i].line == expected[i].first);
     CHECK(read.errors[i].message.starts_with(expected[i].second));
   }
-  CHECK(read.preset.controls.size() == 1);  // what is right is there
+  CHECK(read.preset.controls.size() == 1);  // the valid control is kept
   std::string many = "model = \"x.mdl\"\n";
   for (int i = 0; i < 1000; ++i) {
     many += "k" + std::to_string(i) + " = 1\n";
@@ -358,7 +358,7 @@ TEST_CASE("deeply nested TOML is rejected before parsing", "[preset]") {
                    repeated(9, "["),
                2, 13, message});
   check_error({"a = \"\"\"x\"\"\"\"\"\nb = " + repeated(9, "["), 2, 13, message});
-  // What only looks so is none of it: texts, numbers, and what closes again.
+  // Texts, numbers and closed brackets do not count as nesting.
   for (const std::string& fine :
        {"\"" + repeated(20, "[") + "\"", "'" + repeated(20, ".") + "'",
         "\"\"\"" + repeated(20, "[\n\"\"") + "\"\"\"", "\"x\" # " + repeated(20, ".")}) {
@@ -372,7 +372,7 @@ TEST_CASE("deeply nested TOML is rejected before parsing", "[preset]") {
     numbers += "p" + std::to_string(i) + " = { value = 0.5, range = [0.25, 0.75] }\n";
   }
   CHECK(parse_preset(numbers).ok());
-  // Right up to the limit it is for others to complain.
+  // Up to the limit, the TOML parser reports errors.
   check_error({"model = \"x.mdl\"\n" + repeated(8, "a.") + "a = 1", 2, 1, "unknown key 'a'"});
 }
 
@@ -390,7 +390,7 @@ TEST_CASE("invalid TOML is reported with its position", "[preset]") {
   const auto second = parse_preset("model = \"x\"\nvoices = = 3");
   REQUIRE(second.errors.size() == 1);
   CHECK(second.errors[0].line == 2);
-  // Text that no person wrote.
+  // Random text.
   support::Random random(12);
   const std::string good =
       with_control("from = \"note\"\nto = \"in1\"\nrange = [0, 1]\nhow = \"hold\"");
@@ -426,8 +426,8 @@ TEST_CASE("a model that no key can play suggests a line to add", "[preset]") {
         "keys strike it");
   CHECK(told("@s mesh 4 4 1. 0.1 0. 0. 0.\n").find("'@in1 frcInput [@s 0.3 0.4]'") !=
         std::string::npos);
-  CHECK(told("@g ground 0.\n@in1 frcInput @g\n") == "");  // nothing moves at all
-  // A ground is no reason to leave out what comes behind it.
+  CHECK(told("@g ground 0.\n@in1 frcInput @g\n") == "");  // nothing moves
+  // The suggestion skips grounds.
   const Preset second =
       default_preset(network_of(triangle + "@in1 frcInput @g\n@in2 frcInput @m0\n"), false);
   REQUIRE(second.controls.size() == 2);
@@ -459,10 +459,10 @@ TEST_CASE("the default preset chooses gestures by the laws of the links", "[pres
   CHECK(struck.controls[0].target == "in1");
 
   const Preset plucked = default_preset(network_of(scenes::iplay_the_triangle()), false);
-  REQUIRE(plucked.controls.size() == 2);  // keys, and the wheel for the hand
+  REQUIRE(plucked.controls.size() == 2);  // keys, and the modulation wheel
   CHECK(plucked.controls[0].source == ControlSource::note);
   CHECK(plucked.controls[0].gesture == Gesture::pluck);
-  CHECK(plucked.controls[0].travel == Approx(0.05).epsilon(1e-12));  // clear of the pluck's 0.01
+  CHECK(plucked.controls[0].travel == Approx(0.05).epsilon(1e-12));  // beyond the pluck's 0.01
   CHECK(plucked.controls[1].source == ControlSource::controller);
   CHECK(plucked.controls[1].number == 1);
 
@@ -472,7 +472,7 @@ TEST_CASE("the default preset chooses gestures by the laws of the links", "[pres
   const Preset bowed = default_preset(network_of(scenes::bowed_string()), false);
   REQUIRE(bowed.controls.size() == 1);
   CHECK(bowed.controls[0].gesture == Gesture::bow);
-  // A bow only sings between a third and all of its scale.
+  // A bow sounds only between a third of its scale and the scale.
   CHECK(bowed.controls[0].low > 5e-5 / 3);
   CHECK(bowed.controls[0].high < 5e-5);
 
@@ -480,7 +480,7 @@ TEST_CASE("the default preset chooses gestures by the laws of the links", "[pres
   REQUIRE(heard.controls.size() == 1);
   CHECK(heard.controls[0].source == ControlSource::audio);
 
-  // Every default preset is one that compiles, and the bare one has channel n on input n.
+  // Every default preset compiles, and the bare one maps channel n to input n.
   for (const scenes::Example& example : scenes::nine_instruments()) {
     CAPTURE(example.name);
     const Network network = network_of(example.text);

@@ -1,4 +1,4 @@
-// Networks as text again: exact texts, and that reading them gives the same network.
+// Printing networks: exact texts, and reading them back.
 #include "core/model/language/print.h"
 
 #include <algorithm>
@@ -71,7 +71,7 @@ TEST_CASE("a network is printed in sections, with one element per line", "[print
       "@out1 posOutput [@s 0.2]\n"
       "@out2 frcOutput @in3\n";
   CHECK(print_network(network_of(printed)) == printed);
-  // The same in other words, in another order, and in part in the other dialect.
+  // The same network in other words, another order, and partly the other dialect.
   const std::string written =
       "@out2 frcOutput @in3\n@out1 posOutput @s 0.20\n@in1 forceInput @o\n@g ground 0.\n"
       "~begin left\n@in3 posInput [0 1 .5]\n@m mass 1.0 0.002 [1 2 0] -1e2\n"
@@ -219,10 +219,11 @@ TEST_CASE("'~motion' is printed only if it is needed", "[print]") {
   CHECK(starts("~motion delayed\n@m mass 1 1 0.9").empty());
   CHECK(starts("~motion velocity\n@m mass 1 1 0.9") == "~motion velocity");
   CHECK(starts("~motion delayed\n@m mass 1 1 0") == "~motion delayed");
-  // A bow's profile of 0 shows the dialect, but is not printed; a drawing's place shows the other.
+  // A bow's profile of 0 reveals one dialect but is not printed; a drawing reveals the other.
   CHECK(starts("@m mass 1 1 2\n@n mass 1 0 0\n@l nlBow @m @n 1 1 0") == "~motion velocity");
   CHECK(starts("@m mass 1 1 1 membrane 1 2") == "~motion delayed");
-  // A jump from 0 beside a rest elsewhere: read by itself, the jump would become a rest.
+  // A jump from 0 next to a mass at rest elsewhere: without '~motion' the jump would be read as
+  // rest.
   CHECK(starts("~motion delayed\n@m mass 1 1 0\n@n mass 1 0 1") == "~motion delayed");
 }
 
@@ -236,7 +237,7 @@ TEST_CASE("equal networks compare equal in any order of arguments", "[print]") {
                    "@s string 5 1. p .5 0 0\n@l springDamper @m @o 1e0 5e-1\n@m mass 1.00 0 0\n"
                    "@o osc 1 [.5] [(p * 2)] 0 0\n@p param 2.") == plain);
   CHECK(canonical(plain) == plain);
-  // One point for two ends comes to one for each.
+  // A point that two ends share becomes one point each.
   Network shared = plain;
   shared.outputs[0].mass = shared.inputs[1].mass;
   const Network parted = canonical(shared);
@@ -255,7 +256,7 @@ TEST_CASE("unnamed elements are printed with unused names", "[print]") {
   const Network read = network_of(text);
   CHECK(read.masses.size() == 1 + 5 + 3);
   CHECK(read.links.size() == 2 + 4 + 2);
-  // 0.25 is a node; 0.3 lies between two; a parameter may move.
+  // 0.25 is a node; 0.3 lies between two nodes; a parameter may change.
   CHECK(read.masses[read.links[0].b].name == "m2");
   CHECK(has_line(text, "# at 0.3 of what was a macro; its nearest mass stands for that place"));
   CHECK(has_line(text, "# at m0 of what was a macro; its nearest mass stands for that place"));
@@ -276,7 +277,7 @@ TEST_CASE("every shipped model reads back unchanged after printing", "[print]") 
 
 namespace {
 
-// Networks of all kinds, as a text could have made them, with their arguments in disorder.
+// Random networks as a text could describe them, with arguments in random order.
 class Maker {
  public:
   explicit Maker(std::uint64_t seed) : random_(seed) {}
@@ -352,7 +353,7 @@ class Maker {
     const bool is_unary = op == Op::negate || (op >= Op::sqrt && op <= Op::exp);
     Formula made = tree(depth - 1);
     if (op == Op::negate && made.size() == 1 && made[0].op == Op::number) {
-      return made;  // a text has no negated number, only a negative one
+      return made;  // the reader folds a negated number
     }
     for (int i = is_unary ? 1 : op == Op::clamp ? 3 : 2; i > 1; --i) {
       const Formula more = tree(depth - 1);
@@ -449,7 +450,7 @@ class Maker {
       link.arguments[0] = which < 2 ? argument() : no_argument;
       link.arguments[1] = which > 0 ? argument() : no_argument;
     }
-    if (link.law == Law::either_bow) {  // its profile is no number
+    if (link.law == Law::either_bow) {  // its profile is not constant
       link.law = network_.parameters.empty() ? Law::bow : link.law;
       link.arguments[2] =
           network_.parameters.empty() ? no_argument : argument({{Op::parameter, 0, 0.0}});
@@ -464,7 +465,7 @@ class Maker {
   int names_ = 0;
 };
 
-// The same network with its arguments the other way round, and each of them twice.
+// Returns the same network with its arguments reversed and duplicated.
 Network disordered(Network network) {
   const auto count = static_cast<ArgumentId>(network.arguments.size());
   std::reverse(network.arguments.begin(), network.arguments.end());

@@ -1,5 +1,5 @@
-// The rules by what they say where a text is not as it should be: problems and their places, in one
-// pass. What texts become: rules_test.cpp.
+// The rules of the language for incorrect texts: errors and their positions, in one
+// pass. rules_test.cpp tests correct texts.
 #include <cmath>
 #include <span>
 #include <string>
@@ -49,7 +49,7 @@ TEST_CASE("unknown lines are skipped with a warning", "[problems]") {
 // --- R17 ---------------------------------------------------------------------------------------
 
 TEST_CASE("the laws are the current ones", "[problems]") {
-  // f on the second end after one tick, with the first pushed d away and coming at v per sample.
+  // Returns the force on the second end after one sample, at distance d and velocity v.
   const auto force = [](const std::string& link, double d, double v) {
     support::Bare<double> bare(make_program(
         network_of("@in1 posInput 0\n@g ground 0\n@l " + link + "\n@out1 frcOutput @g"), 44100.0,
@@ -57,7 +57,7 @@ TEST_CASE("the laws are the current ones", "[problems]") {
     bare.step({d - v});
     return bare.step({d})[0];
   };
-  // Inside the pick's tenth it is damped too; the 2018 law attracts there.
+  // Within a tenth of the scale the pluck is damped, too; the law of 2018 attracts there.
   CHECK(force("nlPluck @in1 @g 1 1 0.5", 0.05, 0.25) == Approx(-0.9 * 0.05 + 0.5 * 0.25));
   CHECK(force("nlPluck @in1 @g 1 1", 0.5, 0.25) == Approx(-0.1 + 0.05));
   CHECK(force("nlBow @in1 @g 0.9 3", 0.0, 0.5) == Approx(0.6 * 0.5));
@@ -70,7 +70,7 @@ TEST_CASE("the laws are the current ones", "[problems]") {
   CHECK(force("nlContact @in1 @g 1 1 5 0.5", 2.5, 0.25) == Approx(12.5 + 0.125));
   CHECK(force("nlContact @in1 @g 1 1 5 0.5 2", -1.0, 0.25) == Approx(1.0 + 1.0 + 0.125));
   CHECK(force("powerContact @in1 @g 2 1.5 0.5 1", -0.75, 0.25) == Approx(2.125 * 0.125));
-  // It may pull on the way out, as written.
+  // A contact may attract while it separates, as published.
   CHECK(force("contact @in1 @g 0.5 1", 0.5, -0.5) == Approx(0.25 - 0.5));
   CHECK(force("contact @in1 @g 0.5 1 1", -1.0, -0.5) == 0.0);
   CHECK(force("nlSpring3 @in1 @g 1 2 0", 0.5, 0.0) == Approx(0.5 + 2.0 * 0.125));  // once
@@ -108,7 +108,7 @@ TEST_CASE("warnings stop after a hundred, and are not errors", "[problems]") {
   CHECK(parsed.ok());
   REQUIRE(parsed.diagnostics.size() == 101);
   CHECK(parsed.diagnostics.back().message == "too many warnings; the rest are not shown");
-  // Behind them an error is still told.
+  // An error after the warnings is still reported.
   const ParsedNetwork wrong = parse_network(text + "@c mas 1 0 0");
   CHECK_FALSE(wrong.ok());
   CHECK(wrong.diagnostics.back().line == 305);

@@ -1,5 +1,5 @@
-// The rules by which the dialects become one language: what each accepts and becomes. Those about
-// macros and places are in macro_test.cpp; what is said of a whole file's problems:
+// The rules by which the dialects become one language. Rules about
+// macros and places are in macro_test.cpp, those about errors in
 // problems_test.cpp.
 #include <cmath>
 #include <span>
@@ -46,8 +46,8 @@ Network linked(const std::string& line) {
 // --- R1 ----------------------------------------------------------------------------------------
 
 TEST_CASE("an unknown keyword is an error with a suggestion", "[rules]") {
-  // Of every keyword: a letter lost, a letter doubled, two exchanged. What is told is no further
-  // away than the word that was meant.
+  // Every keyword with a letter lost, a letter doubled, and two exchanged. The suggestion is no
+  // further away than the intended word.
   for (const Keyword& keyword : keywords()) {
     const std::string word(keyword.word);
     std::string exchanged = word;
@@ -88,7 +88,7 @@ TEST_CASE("older keywords are synonyms of newer ones", "[rules]") {
         network_of(two_masses + "@in1 frcInput @b"));
   CHECK(network_of("@o cel 1 2 3 4 5") == network_of("@o osc 1 2 3 4 5"));
   CHECK(network_of("@o cel 1 2 3 9 4 5") == network_of("@o osc 1 2 3 9 4 5"));
-  // A word is told as it was written.
+  // Messages quote the word as written.
   check_error(two_masses + "@l detent @a @b 1", 3, 18,
               "'detent' takes 4 to 5 arguments (@A @B K Z [THRESHOLD]), found 3");
   check_error("@o cel 1 2 3 4", 1, 15,
@@ -135,7 +135,7 @@ TEST_CASE("omitted arguments are 0", "[rules]") {
     CHECK(link_value(turned, 2) == 0.5);
   }
 
-  // Of a mass and an oscillator it is the gravity, in the middle.
+  // The gravity of a mass or an oscillator, in the middle, may be omitted.
   const Network heavy = network_of("@a mass 2 3 4 5\n@b osc 2 3 4 5 6 7\n");
   CHECK(value(heavy, heavy.masses[0].gravity) == 3.0);
   CHECK(heavy.masses[0].position == 4.0);
@@ -152,7 +152,7 @@ TEST_CASE("omitted arguments are 0", "[rules]") {
 // --- R5 ----------------------------------------------------------------------------------------
 
 TEST_CASE("a form of one dialect determines the meaning of the third argument", "[rules]") {
-  // Behind a mass that would be read otherwise without it.
+  // After a mass that would otherwise be read in the other meaning.
   const std::string as_delayed = two_masses + "@c mass 1 0 1\n@k param 1\n";
   const std::string as_velocity = two_masses + "@c mass 1 1 0\n@k param 1\n";
   REQUIRE(network_of(as_delayed).third == delayed);
@@ -203,7 +203,7 @@ TEST_CASE("a form of one dialect determines the meaning of the third argument", 
     CHECK(network_of(as_delayed + line).third == delayed);
     CHECK(network_of(as_velocity + line).third == delayed);
   }
-  // What every dialect has, or none in particular, says nothing.
+  // Forms that all dialects share indicate nothing.
   for (const char* const line :
        {"@x spring @a @b 1", "@x spring @a @b 1 1", "@x springDamper @a @b 1 1",
         "@x damper @a @b 1", "@x contact @a @b 1 1 1", "@x nlPluck @a @b 1 1", "@x nlBow @a @b 1 1",
@@ -214,13 +214,13 @@ TEST_CASE("a form of one dialect determines the meaning of the third argument", 
     CHECK(network_of(as_delayed + line).third == delayed);
     CHECK(network_of(as_velocity + line).third == velocity);
   }
-  // No file mixes them; if one does, the newer dialect's word counts.
+  // If a file mixes dialects, the newer one wins.
   CHECK(network_of(two_masses + "@c massG 1 1 2 0\n@x contact @a @b 1 1").third == velocity);
 }
 
 TEST_CASE("otherwise the states determine the meaning", "[rules]") {
   const auto third = [](const std::string& text) { return network_of(text).third; };
-  // (x, x) is at rest in one meaning, (x, 0) in the other; (0, x) was thrown in MIMS.
+  // (x, x) is at rest in one meaning, (x, 0) in the other; (0, x) has a velocity in MIMS.
   CHECK(third("@a mass 1 0 0") == delayed);
   CHECK(third("@a mass 1 1 1") == delayed);
   CHECK(third("@a mass 1 -0.02 -0.02") == delayed);
@@ -230,10 +230,10 @@ TEST_CASE("otherwise the states determine the meaning", "[rules]") {
   CHECK(third("@a mass 1 -1 0.") == velocity);
   CHECK(third("@a osc 1 .1 0 1 0") == velocity);
   CHECK(third("@a osc 1 .1 0 1 1") == delayed);
-  // Grounds and hands have no third argument.
+  // Grounds and position inputs have no third argument.
   CHECK(third("@a ground 1\n@in1 posInput 1\n@b mass 1 0 0") == delayed);
 
-  // What it comes to: the change of position per sample at the start.
+  // The result: the velocity per sample at the start.
   const auto start = [](const std::string& text) {
     const Network network = network_of(text);
     return initial_velocity(network, network.masses[0]);
@@ -257,7 +257,7 @@ TEST_CASE("the third component of a vector moves, the others are for drawing", "
   CHECK(network.masses[0].third == -100.0);
   CHECK(network.masses[1].position == 6.0);
   CHECK(network.masses[2].third == 2.0);
-  CHECK(network.masses[4].position == 9.0);  // a hand stands behind what moves
+  CHECK(network.masses[4].position == 9.0);  // a position input follows the masses
   CHECK(network.macros[0].position == 3.0);
   CHECK(network.macros[0].third == 6.0);
   const auto drawn = [&](std::uint32_t drawing) { return network.drawings.at(drawing - 1); };
@@ -287,7 +287,7 @@ TEST_CASE("display triples and blocks are kept as groups", "[rules]") {
   }
   CHECK(triples.masses[4].drawing == 0);
 
-  // The innermost block that is open draws; ending an outer one leaves it open.
+  // The innermost open block is the group; ending an outer one leaves it open.
   const Network blocks = network_of(
       "~begin x\n@a mass 1 0 0\n~begin y\n@b mass 1 [1 2 0] 0\n~end x\n@c chain 4 1 1 1 0 0\n"
       "~end y\n@d mass 1 0 0\n~begin x\n@in1 posInput 0\n@r spring @a @b 1\n~end x\n");
@@ -303,7 +303,7 @@ TEST_CASE("display triples and blocks are kept as groups", "[rules]") {
   check_error(two_masses + "~begin", 3, 1, "expected '~begin NAME' or '~end NAME'");
   check_error(two_masses + "~begin x y", 3, 1, "expected '~begin NAME' or '~end NAME'");
   check_error(two_masses + "~open x", 3, 1, "expected '~begin NAME' or '~end NAME'");
-  // What could not be a name is one argument too many.
+  // A text that cannot be a name is a surplus argument.
   check_error(
       "@a mass 1 0 0 0 7 7", 1, 17,
       "'mass' takes 3 to 4 arguments (M [G] POSITION MOTION), found 6; a drawing is GROUP X "
@@ -354,7 +354,7 @@ TEST_CASE("a plus adds, and a sum is scaled as a whole", "[rules]") {
   CHECK(link_value(network, 1) == 0.002 + 0.004 * 0.5);
   CHECK(link_value(linked("spring @a @b 1e+2"), 0) == 100.0);
   CHECK(link_value(linked("spring @a @b +p"), 0) == 0.5);
-  // At twice the rate a damping is half, both of its terms.
+  // At twice the rate a damping is halved, with both of its terms.
   const Program program = make_program(network, 88200.0, true);
   const LinkRun& run = program.link_runs.at(0);
   const auto coefficient = [&](std::size_t i) {
@@ -376,7 +376,7 @@ TEST_CASE("a slash that an editor lost is restored with a warning", "[rules]") {
              {{Severity::warning, 6, 24, 1, missing + "'0.1 * kScale/12'"}});
   const Network network = network_of(start + "@l spring @a @b sqrt(kScale3)");
   CHECK(link_value(network, 0) == std::sqrt(0.3 / 3));
-  // A parameter of that very name is meant, and what has no digits behind it is a mistake.
+  // A parameter with exactly that name wins; a name without digits is an error.
   CHECK(link_value(network_of(start + "@l spring @a @b kScale*k2"), 0) == 0.3 * 8.0);
   check_error(start + "@l spring @a @b kScal*k2", 6, 17,
               "'kScal' is not a parameter of this model");
@@ -428,7 +428,7 @@ TEST_CASE("missing channels cause a warning", "[rules]") {
               {Severity::warning, 5, 1, 1, "there is @in4, but no @in3"}});
   check_warning(sounding + heard + "@in64 frcInput @a\n", 5, 1,
                 "there is @in64, but none of @in1 to @in63");
-  // An audio parameter's channel is no gap, and may be one that a hand has too.
+  // The channel of an audio parameter is not a gap, and may also be a position input.
   check_told(sounding + heard + "@in2 frcInput @a\n@p audioParam @in1\n@k spring @a @b p\n", {});
   check_told(sounding + heard + "@in1 frcInput @a\n@p audioParam @in1\n@k spring @a @b p\n", {});
   check_warning(sounding + heard + "@p audioParam @in2\n@k spring @a @b p\n", 5, 1,
@@ -438,7 +438,7 @@ TEST_CASE("missing channels cause a warning", "[rules]") {
 // --- R13, R15, R16 -----------------------------------------------------------------------------
 
 TEST_CASE("gravity is divided by the reference rate in MIMS4Max, and not in MIMS", "[rules]") {
-  // One step from rest: v = -g/M, g as the dialect means it.
+  // One step from rest: v = -g/M, with g as in the dialect.
   const auto first_step = [](const std::string& mass, double rate_hz, bool rescale) {
     support::Bare<double> bare(
         make_program(network_of(mass + "\n@out1 posOutput @m"), rate_hz, rescale));
@@ -447,7 +447,7 @@ TEST_CASE("gravity is divided by the reference rate in MIMS4Max, and not in MIMS
   CHECK(first_step("@m massG 2. 0.5 0. 0.", 44100.0, true) == -0.25);
   CHECK(first_step("@m mass 2. 441 0. 0.", 44100.0, true) == -441.0 / 44100.0 / 2.0);
   CHECK(first_step("@m osc 2. 0. 0. 441 0. 0.", 44100.0, true) == -441.0 / 44100.0 / 2.0);
-  // Half the time, a quarter of the way; raw numbers know no rate.
+  // Half the time gives a quarter of the distance; raw numbers ignore the rate.
   CHECK(first_step("@m massG 2. 0.5 0. 0.", 88200.0, true) == -0.25 / 4.0);
   CHECK(first_step("@m mass 2. 441 0. 0.", 88200.0, true) == -441.0 / 44100.0 / 8.0);
   CHECK(first_step("@m massG 2. 0.5 0. 0.", 88200.0, false) == -0.25);
@@ -484,7 +484,7 @@ TEST_CASE("forces and positions act in the same sample", "[rules]") {
                    44100.0, true));
   CHECK(struck.step({1.0, 0.5}) == std::vector{0.75, 1.5});
   CHECK(struck.step({0.0, 0.0}) == std::vector{1.5, 0.0});
-  // A hand's place is heard at once, what it pulls moves one tick later, and it feels the pull.
+  // A position is output at once; the mass moves one sample later.
   support::Bare<double> pulled(
       make_program(network_of("@m mass 2 0 0\n@in1 posInput 0\n@l spring @in1 @m 0.5\n"
                               "@out1 posOutput @in1\n@out2 posOutput @m\n@out3 frcOutput @in1\n"

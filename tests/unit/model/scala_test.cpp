@@ -1,4 +1,4 @@
-// Scala's scales and keyboard maps: what they say, and what is wrong with them.
+// Scala's scales and keyboard maps: values and errors.
 #include "core/model/tuning/scala.h"
 
 #include <cmath>
@@ -12,7 +12,7 @@ namespace {
 
 using namespace support;
 
-// Ptolemy's intense diatonic, as the archive has such files: comments, blanks, words behind.
+// Ptolemy's intense diatonic in the style of the archive: comments, blanks, words after numbers.
 const std::string just =
     "! ptolemy.scl\n!\nIntense Diatonic Syntonon, also Zarlino's scale\n 7\n!\n 9/8\n 5/4 third\n"
     " 4/3\n 701.955 cents\n 5/3\n 15/8\n 2/1\n";
@@ -60,7 +60,7 @@ TEST_CASE("steps of a scale are ratios, integers or cents", "[scala]") {
   const auto other = parse_scale("x\r\n3\r\n100.\r\n-5.0\r\n\t2\r\n");
   REQUIRE(other);
   CHECK(other->cents == std::vector<double>{100.0, -5.0, 1200.0});
-  CHECK(parse_scale("\n1\n2"));  // a description may be empty
+  CHECK(parse_scale("\n1\n2"));  // the description may be empty
 }
 
 TEST_CASE("without a keyboard map, middle C plays step 0", "[scala]") {
@@ -75,7 +75,7 @@ TEST_CASE("without a keyboard map, middle C plays step 0", "[scala]") {
 }
 
 TEST_CASE("a keyboard map assigns steps and the reference pitch", "[scala]") {
-  // The white keys of a piano play the seven steps, the black ones none; A is 432 Hz.
+  // The white keys play the seven steps, the black keys none; A is 432 Hz.
   const std::string white =
       "! white.kbm\n12\n0\n127\n60\n69\n432.0\n7\n0\nx\n1\nx\n2\n3\nx\n4\nx\n5\nx\n6\n";
   const auto keys = keys_of(just, white);
@@ -85,7 +85,7 @@ TEST_CASE("a keyboard map assigns steps and the reference pitch", "[scala]") {
   CHECK(keys[72] == Approx(432.0 * 6.0 / 5.0).epsilon(1e-13));
   CHECK(keys[64] == Approx(432.0 * 3.0 / 5.0 * 5.0 / 4.0).epsilon(1e-13));
   CHECK(keys[47] == Approx(432.0 * 3.0 / 5.0 / 2.0 * 15.0 / 16.0).epsilon(1e-13));
-  // Outside its keys nothing is retuned; what is left out at the end is silent.
+  // Keys outside the range are not retuned; keys missing at the end are silent.
   const auto some = keys_of(just, "3\n60\n70\n60\n60\n300\n0\n0\n1\n");
   CHECK(some[59] == Approx(440.0 * std::exp2(-10.0 / 12.0)).epsilon(1e-13));
   CHECK(some[71] == Approx(440.0 * std::exp2(2.0 / 12.0)).epsilon(1e-13));
@@ -93,7 +93,7 @@ TEST_CASE("a keyboard map assigns steps and the reference pitch", "[scala]") {
   CHECK(some[61] == Approx(300.0 * 9.0 / 8.0).epsilon(1e-13));
   CHECK(some[62] == 0.0);
   CHECK(some[63] == Approx(600.0).epsilon(1e-13));  // 0: the map repeats by the period
-  // A silent reference says nothing.
+  // A silent reference key is an error.
   const auto scale = parse_scale(just);
   const auto map = parse_keyboard_map("2\n0\n127\n60\n61\n440\n7\n0\nx\n");
   REQUIRE((scale && map));
@@ -129,7 +129,7 @@ TEST_CASE("errors in tunings have a line", "[scala]") {
 }
 
 TEST_CASE("random tuning files do not crash the reader", "[scala]") {
-  // Good files with a few letters changed, cut or doubled: the rest is for the fuzzer.
+  // Valid files with a few characters changed, removed or doubled.
   support::Random random(17);
   const std::string map = "12\n0\n127\n60\n69\n432.0\n7\n0\nx\n1\nx\n2\n3\nx\n4\nx\n5\nx\n6\n";
   constexpr std::string_view letters = "0123456789./-x! \n\r\te";
@@ -164,7 +164,7 @@ TEST_CASE("random tuning files do not crash the reader", "[scala]") {
 }
 
 TEST_CASE("keys sound at the pitch of the scale within 0.01 cent", "[scala]") {
-  // One mass on a spring, whose frequency in the scheme is known: 2 - K/M = 2 cos w.
+  // One mass on a spring, whose frequency in the scheme is 2 - K/M = 2 cos w.
   const std::string one =
       "@m mass 1. 0. 0.\n@g ground 0.\n@r spring @m @g 0.01\n@in1 frcInput @m\n@out1 posOutput "
       "@m\n";
@@ -175,7 +175,7 @@ TEST_CASE("keys sound at the pitch of the scale within 0.01 cent", "[scala]") {
     player.run(44100, events);
     return measured_hz(player.y(), 44100.0, guess_hz);
   };
-  // 19 equal steps: no key but 60 is where twelve would have it.
+  // 19 equal steps: only key 60 has the pitch of equal temperament.
   std::string nineteen = "19\n19\n";
   for (int step = 1; step <= 19; ++step) {
     nineteen += std::to_string(1200.0 * step / 19.0) + "\n";
@@ -188,7 +188,7 @@ TEST_CASE("keys sound at the pitch of the scale within 0.01 cent", "[scala]") {
     CHECK(std::fabs(cents(heard_hz(preset, {}, key, wanted_hz), wanted_hz)) < 0.01);
     CHECK(std::fabs(cents(heard_hz(preset, {}, key, wanted_hz), 1.0001 * wanted_hz)) > 0.01);
   }
-  // A reference of 432 Hz moves all of it, a transposition too.
+  // A reference of 432 Hz shifts all keys, and so does a transposition.
   preset.a4_hz = 432.0;
   preset.transpose = 12;
   const double lower_hz = 432.0 * std::exp2(3.0 / 12.0 + 10.0 / 19.0);
@@ -196,7 +196,7 @@ TEST_CASE("keys sound at the pitch of the scale within 0.01 cent", "[scala]") {
   Preset equal = struck(1);
   equal.a4_hz = 442.0;
   CHECK(std::fabs(cents(heard_hz(equal, {}, 69, 442.0), 442.0)) < 0.01);
-  // By a tuning message, before the note and in its midst.
+  // By a tuning message, before and during the note.
   const Event message = {.kind = EventKind::key_tuning, .index = 69, .value = 450.0, .value2 = 1.0};
   CHECK(std::fabs(cents(heard_hz(struck(1), {message}, 69, 450.0), 450.0)) < 0.01);
   Player player(one, struck(1));
@@ -205,7 +205,7 @@ TEST_CASE("keys sound at the pitch of the scale within 0.01 cent", "[scala]") {
   player.run(50000, {note_on(0, 69), later});
   const std::vector<double> tail(player.y().begin() + 5000, player.y().end());
   CHECK(std::fabs(cents(measured_hz(tail, 44100.0, 450.0), 450.0)) < 0.01);
-  // One that is not for what sounds leaves it, and is for the next; reset takes it back.
+  // A tuning message for later notes does not change the current one; reset removes it.
   later.value2 = 0.0;
   Player next(one, struck(1));
   next.run(50000, {note_on(0, 69), later});

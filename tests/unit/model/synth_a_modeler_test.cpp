@@ -1,4 +1,4 @@
-// Synth-A-Modeler's models: their units and signs by hand, what is refused, and harm done to them.
+// Synth-A-Modeler's models: units and signs, errors, and damaged texts.
 #include <algorithm>
 #include <cmath>
 
@@ -24,7 +24,7 @@ double value_of(const Network& network, ArgumentId id) {
   return argument_value(network, id, parameter_values(network));
 }
 
-// Output 1 while the inputs stay where they are.
+// Returns output 1 with constant inputs.
 std::vector<double> rendered(const std::string& text, std::size_t frames, double hand = 0.0) {
   const Network network = expand_macros(network_of(text));
   Bare<double> bare(make_program(network, fs, true, schemes_of(network, Passivity::always).links));
@@ -81,11 +81,11 @@ TEST_CASE("a mass of a gram on 1000 N/m swings at 1000 rad/s", "[synth_a_modeler
   const std::vector<double> y = rendered(
       "mass(0.001,0.0,1.0),m;\nground(0.0),g;\nlink(1000.0,0.0,0.0),l,m,g;\naudioout,a,m;\n",
       44100);
-  // The sampled swing has 2 asin(sqrt(K/M)/2) a sample.
+  // The sampled oscillation advances by 2 asin(sqrt(K/M)/2) per sample.
   const double theta = 2.0 * std::asin(0.5 * std::sqrt(1000.0 / 1944810.0));
   CHECK(std::fabs(theta * fs / (2.0 * std::numbers::pi) - 159.154943) < 0.004);
   CHECK(std::fabs(measured_hz(y, fs, 159.0) - theta * fs / (2.0 * std::numbers::pi)) < 1e-3);
-  // A metre per second swings out to a millimetre.
+  // A metre per second gives an amplitude of a millimetre.
   const double most = *std::max_element(y.begin(), y.end());
   CHECK(std::fabs(most - 1e-3) < 1e-6);
 }
@@ -119,7 +119,7 @@ TEST_CASE("resonators are modes of one body at one place", "[synth_a_modeler]") 
   CHECK(value_of(network, network.macros[0].mass) == 19448100.0);
   CHECK(value_of(network, network.modes[0].frequency_hz) == 200.0);
   CHECK(value_of(network, network.modes[1].frequency_hz) == 330.5);
-  // Their decay is that to 1/e: to 60 dB it takes ln 1000 times as long.
+  // tau is the decay to 1/e; T60 is ln 1000 times as long.
   CHECK(std::fabs(value_of(network, network.modes[0].t60_s) - 0.5 * std::log(1000.0)) < 1e-12);
   CHECK(network.modes[0].shape == std::vector<double>{1.0});
   CHECK(network.modes[1].shape == std::vector<double>{0.5});  // sqrt(0.01/0.04)
@@ -133,7 +133,7 @@ TEST_CASE("waveguides between two terminations are joined", "[synth_a_modeler]")
   CHECK(w.kind == MacroKind::waveguide);
   CHECK(value_of(network, w.impedance) == 22050.0);  // 0.5 * 44100
   CHECK(std::fabs(value_of(network, w.frequency_hz) - 200.0) < 1e-9);
-  const double loss = -std::log(0.99 * 0.98);  // a period
+  const double loss = -std::log(0.99 * 0.98);  // per period
   CHECK(std::fabs(value_of(network, w.t60_s) - std::log(1000.0) * 0.005 / loss) < 1e-9);
   CHECK(value_of(network, w.brightness) == 1.0);
   REQUIRE(!network.taps.empty());
@@ -161,10 +161,11 @@ TEST_CASE("the filter of a termination adds delay and damps high partials", "[sy
       "termination(simpleStringTerm(r,fc)),a;\ntermination(simpleStringTerm(-0.995,fc)),b;\n"
       "junction(0.1),j;\naudioout,o,j;\n");
   const Macro& w = network.macros[0];
-  CHECK(std::fabs(value_of(network, w.frequency_hz) - 100.0) < 1e-9);  // what was taken is back
+  CHECK(std::fabs(value_of(network, w.frequency_hz) - 100.0) < 1e-9);  // the delay is compensated
   CHECK(w.position == 0.1);
   const double flat = -2.0 * std::log(0.995);
-  // A running mean of length 1/fc has sin(x)/x with x = pi f/fc: x^2/6 is lost at each end.
+  // A moving average of length 1/fc has the response sin(x)/x with x = pi f/fc: each end loses
+  // x^2/6.
   const double mean = 2.0 / 6.0 * std::pow(std::numbers::pi * 100.0 / 5000.0, 2);
   CHECK(std::fabs(value_of(network, w.t60_s) / (std::log(1000.0) * 0.01 / (flat + mean)) - 1.0) <
         1e-9);
@@ -235,7 +236,7 @@ TEST_CASE("errors in Synth-A-Modeler files have a line", "[synth_a_modeler]") {
 }
 
 TEST_CASE("approximate translations cause a warning", "[synth_a_modeler]") {
-  // What is found in our own language is told of the line that it comes from.
+  // Messages about the translation have the line of the source.
   check_warning(
       "port(),p;\nmass(1.0,0.0,0.0),m;\nlink(1.0,0.0,0.0),l,m,p;\n"
       "\n  ground(0.0),g;\naudioout,a,m;\n",
@@ -244,13 +245,13 @@ TEST_CASE("approximate translations cause a warning", "[synth_a_modeler]") {
       "port(),p;\nmass(1.0,0.0,0.0),m;\npluck(9.0,0.0,0.006,0.0),l,m,p;\naudioout,a,m;\n");
   REQUIRE(pluck.links.size() == 1);
   CHECK(pluck.links[0].law == Law::pluck);
-  // 0.09 K scale is the most that it pushes with: theirs pushes with k halfWidth.
+  // The maximum force is 0.09 K SCALE here, and k halfWidth in Synth-A-Modeler.
   CHECK(std::fabs(0.09 * value_of(pluck, pluck.links[0].arguments[0]) - 9.0) < 1e-12);
   CHECK(value_of(pluck, pluck.links[0].arguments[1]) == 0.006);
 }
 
 TEST_CASE("output expressions are translated", "[synth_a_modeler]") {
-  // By hand, of a = 1, b = 2.
+  // Expected values for a = 1, b = 2.
   const auto levels = [](const std::string& heard) {
     const Network network = network_of(
         "faustcode: s=hslider(\"\",3,0,9,1);\nport(),p;\nmass(1.0,0.0,0.0),a;\n"

@@ -1,4 +1,4 @@
-// Waveguides in the language: read, refused in plain words, printed, and what they become.
+// Waveguides in the language: reading, errors, printing, expansion.
 #include "core/laws/laws.h"
 #include "core/model/faust/faust.h"
 #include "core/model/language/print.h"
