@@ -149,7 +149,7 @@ TEST_CASE("a generated shape equals the expanded macro", "[generate]") {
     }
     for (const double air : {0.0, 0.0005}) {
       CAPTURE(static_cast<int>(kind), air);
-      // With 11 points, the macro's input and output are at nodes.
+      // The macro's input and output are at nodes if there are 11 points.
       Shape shape{.kind = kind,
                   .length = 11,
                   .width = is_plane(kind) ? 11u : 0u,
