@@ -66,7 +66,7 @@ TEST_CASE("the models are the published networks", "[models]") {
 }
 
 // At equal loudness, pure sustained sounds have the lowest peaks, and clicks with echoes the
-// highest. presets/README.md has the table.
+// highest. presets/README.md gives the reasons.
 TEST_CASE(
     "every preset has two outputs, a forte between -22 and -1 dBFS, and 14 to 34 dB of velocity",
     "[models]") {
