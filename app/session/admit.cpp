@@ -34,7 +34,7 @@ Admission ask_to_play(const Scene& scene, const CompileOptions& options, bool is
   Admission admission;
   auto compiled = compile_network(scene.network, scene.preset, options);
   if (!compiled) {
-    // What does not fit the preset was not read, so this is the model's.
+    // Preset errors were found while reading, so this one is in the model.
     admission.findings.push_back(in_model(scene, compiled.error(), Severity::error));
     return admission;
   }

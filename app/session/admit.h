@@ -1,4 +1,4 @@
-// app/session: compiles what was read, and decides in one place whether it may sound.
+// app/session: compiles a scene and decides whether it may be played.
 #pragma once
 
 #include <optional>
@@ -10,25 +10,26 @@
 
 namespace ressort::session {
 
-// What came of a scene, for whoever plays, renders or checks it.
+// The result of compiling a scene.
 struct Admission {
-  std::optional<Compiled> compiled;  // whatever the findings say; nothing if it cannot be compiled
-  std::vector<Finding> findings;     // an error among them: it shall not sound
+  std::optional<Compiled> compiled;  // set even if errors reject it; empty if compilation failed
+  std::vector<Finding> findings;     // an error among them rejects the scene
   bool is_granted() const;
 };
 
-// Refuses, with file, line and column, what cannot be compiled, and what is not stable as
-// it starts unless the options say to force it. Tells what is narrowed, forced or not proved, and
-// what `is_strict` refuses: a bow that is too strong for its steps, and what a budget promises and
-// is not kept, but not while a better form is yet to be looked for. [any thread but audio]
+// Compiles a scene. Reports errors with file, line and column: compilation errors, and instability
+// at the start values unless the options force it. Warns about narrowed ranges, forced scenes and
+// missing stability proofs. With `is_strict`, two warnings are errors: a bow too strong for the
+// step size, and an exceeded budget of pitch or decay, unless a better form may still be found.
+// [any thread but audio]
 Admission ask_to_play(const Scene& scene, const CompileOptions& options, bool is_strict = false);
 
-// The same for who wants to play or nothing: warnings are added to `warnings`, an error's message
-// is all errors, one a line.
+// The same, for callers that only need the compiled scene. Appends warnings to `warnings`; the
+// error's message has all errors, one a line.
 Result<Compiled> admit(const Scene& scene, const CompileOptions& options,
                        std::vector<std::string>& warnings, bool is_strict = false);
 
-// A warning, where the scene runs away at these parameters, for who looks at it without playing it.
+// Returns a warning if the scene is unstable at these parameters, for callers that do not play it.
 // [any thread but audio]
 std::optional<Finding> instability(const Scene& scene, const std::vector<double>& parameters,
                                    double rate_hz, const Progress& progress);

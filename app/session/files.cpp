@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The installed place or the source tree, whichever is there; RESSORT_DATA goes before both.
+// Returns RESSORT_DATA, the installed folder or the source tree, whichever exists first.
 fs::path data_folder() {
   std::vector<fs::path> tried;
   if (const char* given = std::getenv("RESSORT_DATA")) {
@@ -37,7 +37,7 @@ fs::path data_folder() {
   return fs::current_path(error);
 }
 
-// Where models and presets are looked for, one folder after the other.
+// Returns the folders that are searched for models and presets, in order.
 std::vector<fs::path> known_folders() {
   std::vector<fs::path> folders = {data_folder()};
   if (const std::string user = user_folder(); !user.empty()) {
@@ -59,7 +59,7 @@ std::string names_of_presets() {
   return names;
 }
 
-// The program's by name, then those that the user alone has: places in the list stay.
+// The program's names come first, so that program change numbers do not depend on the user's files.
 std::vector<std::string> names_in(const char* kind, const char* ending) {
   std::vector<std::string> all;
   std::vector<fs::path> folders = known_folders();
@@ -97,7 +97,7 @@ std::string in_any_case(const std::string& name, const std::vector<std::string>&
   return found == known.end() ? "" : *found;
 }
 
-// A preset or a model by its name, with or without its ending, in this case or another.
+// Finds a preset or a model by its name, with or without ending, ignoring case.
 std::string known_scene(const std::string& name) {
   for (const auto& [kind, ending] :
        {std::pair("presets", std::string(".toml")), std::pair("models", std::string(".mdl"))}) {
@@ -123,7 +123,7 @@ std::string meant_by(const std::string& name) {
   return did_you_mean(name, known);
 }
 
-// A text without the mark that some editors put before it.
+// Removes the byte order mark.
 Result<std::string> unmarked(const std::string& path, std::string text) {
   if (text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff")) {
     return Error{"'" + path + "' is text in UTF-16; save it as UTF-8"};
@@ -134,7 +134,7 @@ Result<std::string> unmarked(const std::string& path, std::string text) {
   return text;
 }
 
-// Rounded up: what is a byte too large shall not seem to fit.
+// Rounds up, so that a file that is one byte too large does not seem to fit.
 std::string in_bytes(std::uintmax_t size) {
   const auto whole = [&](int bits) {
     return std::to_string((size + (std::uintmax_t{1} << bits) - 1) >> bits);
@@ -180,7 +180,7 @@ Result<Done> write_text(const std::string& path, const std::string& text, Existi
     return file.error();
   }
   const auto written = file->write(text);
-  // Its name shall lead to all of it even if the power goes.
+  // Flush before the rename, so that the file is complete even after a power failure.
   static_cast<void>(fsync(file->descriptor()));
   return written ? file->keep() : written;
 }
@@ -289,7 +289,7 @@ std::string cache_folder() {
 
 namespace {
 
-// A file of the user's, NAME and its ending, in a folder of his that is made.
+// Returns the path of a user's file and creates its folder.
 Result<std::string> users_file(const std::string& name, const char* kind, const char* ending) {
   constexpr std::size_t longest = 64;
   const bool is_name =

@@ -1,4 +1,4 @@
-// app/session: what a person hears of a load that takes long.
+// app/session: progress messages of long loads.
 #pragma once
 
 #include <chrono>
@@ -11,7 +11,7 @@
 
 namespace ressort::session {
 
-// Tells what is being done with something, after a second and then every two. [one thread]
+// Reports the stage of a load after one second and then every two seconds. [one thread]
 class LoadNews {
  public:
   using Tell = std::function<void(const std::string&)>;
@@ -27,7 +27,7 @@ class LoadNews {
   Clock::time_point next_ = start_ + std::chrono::seconds(1);
 };
 
-// What went wrong, for people: memory has a sentence of its own.
+// Returns the message for a person; running out of memory has a message of its own.
 std::string describe(const std::exception& error);
 
 }  // namespace ressort::session

@@ -16,15 +16,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t longest_source = 160;  // of a line that is shown
+constexpr std::size_t longest_source = 160;  // characters of a printed line
 
-// Goes through a text once, for lines whose numbers never fall.
+// The lines of a text, read in ascending order in one pass.
 class Lines {
  public:
-  explicit Lines(std::string_view text) : rest_(text) {}
+  explicit Lines(std::string_view text) : text_(text), rest_(text) {}
 
-  // Line `number`, from 1.
+  // Returns line `number`, from 1.
   std::string at(int number) {
+    if (number < line_) {
+      *this = Lines(text_);
+    }
     for (; line_ < number && !rest_.empty(); ++line_) {
       const std::size_t end = std::min(rest_.find_first_of("\r\n"), rest_.size());
       const bool pair = end + 1 < rest_.size() && rest_[end] == '\r' && rest_[end + 1] == '\n';
@@ -34,11 +37,12 @@ class Lines {
   }
 
  private:
+  std::string_view text_;
   std::string_view rest_;
   int line_ = 1;
 };
 
-// How many lines end in a text, as Lines counts them.
+// Returns the number of line ends in a text, counted like Lines does.
 int lines_of(std::string_view text) {
   int lines = 0;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -48,18 +52,18 @@ int lines_of(std::string_view text) {
   return lines;
 }
 
-// Which file a line of the model's whole text comes from.
-ModelText text_at(const Scene& scene, int line) {
-  ModelText found{scene.model_path, 1};
-  for (const ModelText& text : scene.texts) {
-    if (text.first_line <= line) {
+// Returns the file that a line of the joined text comes from.
+ModelText text_at(const std::vector<ModelText>& texts, int line) {
+  ModelText found;
+  for (const ModelText& text : texts) {
+    if (text.first_line <= line || found.path.empty()) {
       found = text;
     }
   }
   return found;
 }
 
-// The texts that a scene is read from: those on the disk, or others by the same paths.
+// The files of a scene, on the disk or given by their paths. Records every access.
 class SceneFiles {
  public:
   explicit SceneFiles(const std::vector<SceneFile>* given) : given_(given) {}
@@ -102,7 +106,7 @@ class SceneFiles {
   std::vector<SceneFile> seen_;
 };
 
-// As read_tuning() says.
+// See read_tuning().
 TuningReading tuning_of(const std::string& scale_path, const std::string& map_path,
                         SceneFiles& files) {
   TuningReading out;
@@ -139,124 +143,229 @@ TuningReading tuning_of(const std::string& scale_path, const std::string& map_pa
   return out;
 }
 
+// The result of one stage of reading. Without a value, a finding is an error.
+template <class T>
+struct Stage {
+  std::optional<T> value;
+  std::vector<Finding> findings;
+};
+
+template <class T>
+Stage<T> failed(Finding finding) {
+  return {std::nullopt, {std::move(finding)}};
+}
+
+// A preset's file.
+struct PresetFile {
+  std::string path;
+  std::string text;
+  Preset preset;
+  bool is_valid = true;
+
+  Finding error(const std::string& message, SourceLocation at) const {
+    return finding_of(path, text, {message, at.line, at.column});
+  }
+};
+
+// Reads one scene. Each stage returns a value that later stages do not change.
 class SceneReader {
  public:
   explicit SceneReader(const SceneOptions& options) : options_(options), files_(options.files) {}
 
   Reading read(const std::string& name) {
-    read_all(name);
-    out_.files = files_.take();
-    return std::move(out_);
+    Reading out;
+    // The path of a morph's stop was already checked.
+    const auto path = files_.find(name, options_.is_stop ? Reach::any_file : options_.reach);
+    if (path) {
+      Stage<Scene> scene = path->ends_with(".toml") ? read_with_preset(*path) : read_alone(*path);
+      out.findings = std::move(scene.findings);
+      out.scene = std::move(scene.value);
+    } else {
+      out.findings.push_back(finding_of("", "", path.error()));
+    }
+    out.files = files_.take();
+    return out;
   }
 
  private:
-  void read_all(const std::string& name) {
-    // Where a stop of a morph is has been found within reach already.
-    auto path = files_.find(name, options_.is_stop ? Reach::any_file : options_.reach);
-    if (!path) {
-      fail("", "", path.error());
-      return;
+  Stage<Scene> read_alone(const std::string& path) {
+    Stage<Scene> scene = read_model({path}, path, {.third = options_.third}, true);
+    const Preset preset = scene.value ? scene.value->preset : Preset();
+    return complete(path, std::move(scene), preset);
+  }
+
+  Stage<Scene> read_with_preset(const std::string& path) {
+    const Stage<PresetFile> preset = read_preset(path);
+    Stage<Scene> scene;
+    if (preset.value && !preset.value->preset.model.empty()) {
+      scene = read_scene_of(*preset.value);
     }
-    scene_.path = *path;
-    scene_.name = fs::path(*path).stem().string();
-    const bool is_read =
-        path->ends_with(".toml")
-            ? read_preset()
-            : read_model({*path}, {.third = options_.third, .progress = options_.progress});
-    if (tune() && is_read) {
-      out_.scene = std::move(scene_);
+    scene.findings.insert(scene.findings.begin(), preset.findings.begin(), preset.findings.end());
+    return complete(path, std::move(scene), preset.value ? preset.value->preset : Preset());
+  }
+
+  // Adds the tuning and the warnings.
+  Stage<Scene> complete(const std::string& path, Stage<Scene> scene, const Preset& preset) {
+    Stage<std::vector<double>> keys = read_keys(path, preset);
+    std::move(keys.findings.begin(), keys.findings.end(), std::back_inserter(scene.findings));
+    if (!keys.value) {
+      scene.value.reset();
     }
+    if (scene.value) {
+      Preset& tuned = scene.value->preset;
+      tuned.keys_hz = *std::move(keys.value);
+      tuned.a4_hz = options_.keys.a4_hz.value_or(tuned.a4_hz);
+      tuned.channels = options_.keys.channels.value_or(tuned.channels);
+      for (const Finding& finding : scene.findings) {
+        if (finding.diagnostic.severity == Severity::warning) {
+          scene.value->warnings.push_back(to_string(finding));
+        }
+      }
+    }
+    return scene;
   }
 
-  bool fail(const std::string& file, std::string_view text, const Error& error) {
-    out_.findings.push_back(finding_of(file, text, error));
-    return false;
-  }
-
-  void warn(Finding finding) {
-    finding.diagnostic.severity = Severity::warning;
-    scene_.warnings.push_back(to_string(finding));
-    out_.findings.push_back(std::move(finding));
-  }
-
-  bool read_preset() {
-    auto text = files_.read(scene_.path, max_preset_bytes);
+  Stage<PresetFile> read_preset(const std::string& path) {
+    const auto text = files_.read(path, max_preset_bytes);
     if (!text) {
-      return fail("", "", text.error());
+      return failed<PresetFile>(finding_of("", "", text.error()));
     }
     ParsedPreset read = parse_preset(*text, control::is_reserved);
+    Stage<PresetFile> file{PresetFile{path, *text, std::move(read.preset), read.errors.empty()},
+                           {}};
     for (const Error& error : read.errors) {
-      fail(scene_.path, *text, error);
+      file.findings.push_back(finding_of(path, *text, error));
     }
-    scene_.preset = std::move(read.preset);
-    scene_.preset_text = *text;
-    scene_.has_preset = true;
-    if (scene_.preset.model.empty()) {
-      return false;
+    return file;
+  }
+
+  // The model, the morph, and the preset's fit to them.
+  Stage<Scene> read_scene_of(const PresetFile& file) {
+    const auto paths = find_models(file);
+    if (!paths) {
+      return failed<Scene>(file.error(paths.error().message, file.preset.model_location));
     }
-    std::vector<std::string> names = scene_.preset.with;
-    names.insert(names.begin(), scene_.preset.model);
+    Stage<Scene> scene = read_model(
+        *paths, file.path,
+        options_.third ? ReadOptions{.third = options_.third}
+                       : ReadOptions{.third = file.preset.third, .third_by = "the preset says"},
+        false);
+    if (!scene.value) {
+      return scene;
+    }
+    scene.value->preset = file.preset;
+    scene.value->preset_text = file.text;
+    scene.value->has_preset = true;
+    if (!file.preset.morph.empty()) {
+      Stage<Scene> morph = read_morph(file, *scene.value);
+      std::move(morph.findings.begin(), morph.findings.end(), std::back_inserter(scene.findings));
+      scene.value = std::move(morph.value);
+      if (!scene.value) {
+        return scene;
+      }
+    }
+    const std::vector<Error> unfit = find_preset_errors(scene.value->network, scene.value->preset);
+    for (const Error& error : unfit) {
+      scene.findings.push_back(finding_of(file.path, file.text, error));
+    }
+    if (file.preset.controls.empty() && !scene.value->network.inputs.empty()) {
+      scene.findings.push_back(
+          file.error("there is no [[control]], so neither keys nor sound play this model",
+                     file.preset.model_location));
+      scene.findings.back().diagnostic.severity = Severity::warning;
+    }
+    if (!file.is_valid || !unfit.empty()) {
+      scene.value.reset();
+    }
+    return scene;
+  }
+
+  Result<std::vector<std::string>> find_models(const PresetFile& file) {
+    std::vector<std::string> names = file.preset.with;
+    names.insert(names.begin(), file.preset.model);
     std::vector<std::string> paths;
     for (const std::string& name : names) {
-      const auto model = find_beside("models", name);
+      const auto model = find_beside(file.path, "models", name);
       if (!model) {
-        const std::string missing =
-            options_.reach == Reach::own_folders
-                ? "its model is none of the program's own, and OSC loads no others"
-                : "the model '" + name + "' is neither beside the preset nor in '" +
-                      models_folder() + "'";
-        return fail(
-            scene_.path, *text,
-            {missing, scene_.preset.model_location.line, scene_.preset.model_location.column});
+        return Error{options_.reach == Reach::own_folders
+                         ? "its model is outside the program's folders; OSC cannot load it"
+                         : "the model '" + name + "' is neither beside the preset nor in '" +
+                               models_folder() + "'"};
       }
       paths.push_back(*model);
     }
-    const bool is_read =
-        options_.third ? read_model(paths, {.third = options_.third, .progress = options_.progress})
-                       : read_model(paths, {.third = scene_.preset.third,
-                                            .third_by = "the preset says",
-                                            .progress = options_.progress});
-    if (!is_read || !morph(*text)) {
-      return false;
-    }
-    const std::vector<Error> unfit = find_preset_errors(scene_.network, scene_.preset);
-    for (const Error& error : unfit) {
-      fail(scene_.path, *text, error);
-    }
-    if (scene_.preset.controls.empty() && !scene_.network.inputs.empty()) {
-      const SourceLocation at = scene_.preset.model_location;
-      warn(finding_of(scene_.path, *text,
-                      {"no [[control]] follows, so neither keys nor sound play this model", at.line,
-                       at.column}));
-    }
-    return read.errors.empty() && unfit.empty();
+    return paths;
   }
 
-  // The network that the preset's morph makes of its model, and a knob for it.
-  bool morph(const std::string& text) {
-    Preset& preset = scene_.preset;
-    if (preset.morph.empty()) {
-      return true;
+  // Joins the model's files and parses them. A model alone gets a generated preset.
+  Stage<Scene> read_model(const std::vector<std::string>& paths, const std::string& scene_path,
+                          ReadOptions options, bool is_alone) {
+    std::string text;
+    std::vector<ModelText> texts;
+    for (const std::string& path : paths) {
+      const auto more = files_.read(path, max_model_bytes);
+      if (!more) {
+        return failed<Scene>(finding_of("", "", more.error()));
+      }
+      if (!text.empty() && !text.ends_with('\n')) {
+        text += '\n';
+      }
+      texts.push_back({path, 1 + lines_of(text)});
+      text += *more;
     }
+    options.most_nodes = options_.most_nodes;
+    options.progress = options_.progress;
+    ParsedNetwork parsed = parse_network(text, options);
+    Preset preset;
+    if (parsed.ok() && is_alone) {
+      preset = default_preset(parsed.network, options_.bare);
+      if (const auto idle = idle_keys(parsed.network, preset); idle && !options_.bare) {
+        parsed.diagnostics.push_back(
+            {Severity::warning, idle->line, idle->column, 1, idle->message});
+      }
+    }
+    Stage<Scene> scene;
+    Lines lines(text);
+    for (Diagnostic& diagnostic : parsed.diagnostics) {
+      const std::string source = lines.at(diagnostic.line);
+      const ModelText file = text_at(texts, diagnostic.line);
+      diagnostic.line -= file.first_line - 1;
+      scene.findings.push_back({file.path, diagnostic, source});
+    }
+    if (parsed.ok()) {
+      scene.value = Scene{.name = fs::path(scene_path).stem().string(),
+                          .path = scene_path,
+                          .model_path = paths.front(),
+                          .texts = std::move(texts),
+                          .network = std::move(parsed.network),
+                          .preset = std::move(preset),
+                          .third = parsed.third,
+                          .motion = std::move(parsed.motion)};
+    }
+    return scene;
+  }
+
+  // Replaces the model's network by the preset's morph, and adds a parameter for its position.
+  Stage<Scene> read_morph(const PresetFile& file, const Scene& model) {
+    const Preset& preset = file.preset;
+    const SourceLocation first = preset.morph.front().location;
     if (options_.is_stop) {
-      return fail(scene_.path, text, {"a morph cannot go through another morph"});
+      return failed<Scene>(
+          finding_of(file.path, file.text, {"a morph cannot contain another morph"}));
     }
     std::vector<Scene> others(preset.morph.size());
     std::vector<MorphStop> stops;
     for (std::size_t i = 0; i < preset.morph.size(); ++i) {
       const MorphSetting& setting = preset.morph[i];
-      const auto refuse = [&](SourceLocation at, const std::string& message) {
-        return fail(scene_.path, text, {message, at.line, at.column});
-      };
-      if (!setting.preset.empty()) {
-        auto other = read_other(setting.preset);
+      const bool is_preset = !setting.preset.empty();
+      if (is_preset) {
+        auto other = read_stop(file.path, setting.preset);
         if (!other) {
-          return refuse(setting.location, other.error().message);
+          return failed<Scene>(file.error(other.error().message, setting.location));
         }
         others[i] = *std::move(other);
       }
-      const bool is_preset = !setting.preset.empty();
-      const Network& network = is_preset ? others[i].network : scene_.network;
+      const Network& network = is_preset ? others[i].network : model.network;
       MorphStop stop{.name = is_preset ? setting.preset : "stop " + std::to_string(i + 1),
                      .network = &network,
                      .values = parameter_values(network),
@@ -265,7 +374,7 @@ class SceneReader {
            is_preset ? others[i].preset.parameters : setting.values) {
         const int index = find_parameter(network, value.name);
         if (index < 0) {
-          return refuse(value.location, no_parameter(network, value.name));
+          return failed<Scene>(file.error(no_parameter(network, value.name), value.location));
         }
         stop.values[static_cast<std::size_t>(index)] = value.value;
       }
@@ -275,14 +384,10 @@ class SceneReader {
     for (const ParameterSetting& knob : preset.parameters) {
       knobs.push_back(knob.name);
     }
-    auto network = morphed(scene_.network, stops, preset.morph_parameter, knobs);
-    if (!network && network.error().line == 0) {
-      const SourceLocation at = preset.morph.front().location;
-      return fail(scene_.path, text, {network.error().message, at.line, at.column});
-    }
+    auto network = morphed(model.network, stops, preset.morph_parameter, knobs);
     if (!network) {
-      out_.findings.push_back(finding_in_model(scene_, network.error()));
-      return false;
+      return failed<Scene>(network.error().line == 0 ? file.error(network.error().message, first)
+                                                     : finding_in_model(model, network.error()));
     }
     std::vector<double> values = parameter_values(*network);
     for (const ParameterSetting& knob : preset.parameters) {
@@ -291,34 +396,35 @@ class SceneReader {
       }
     }
     const int position = find_parameter(*network, preset.morph_parameter);
+    Scene scene = model;
     try {
-      scene_.network =
+      scene.network =
           with_even_decay(*std::move(network), {.parameter = static_cast<std::size_t>(position),
                                                 .stops = stops.size(),
                                                 .pitch_mode = preset.pitch_mode,
                                                 .values = values,
                                                 .progress = options_.progress});
     } catch (const Stopped&) {
-      return fail("", "", Error{stopped});
+      return failed<Scene>(finding_of("", "", Error{stopped}));
     }
     if (std::find(knobs.begin(), knobs.end(), preset.morph_parameter) == knobs.end()) {
-      preset.parameters.push_back({.name = preset.morph_parameter,
-                                   .value = 1.0,
-                                   .minimum = 1.0,
-                                   .maximum = static_cast<double>(stops.size())});
+      scene.preset.parameters.push_back({.name = preset.morph_parameter,
+                                         .value = 1.0,
+                                         .minimum = 1.0,
+                                         .maximum = static_cast<double>(stops.size())});
     }
-    return true;
+    return {std::move(scene), {}};
   }
 
-  Result<Scene> read_other(const std::string& name) {
-    const auto path = find_beside("presets", name + ".toml");
+  // Reads a preset that is a stop of the morph.
+  Result<Scene> read_stop(const std::string& preset_path, const std::string& name) {
+    const auto path = find_beside(preset_path, "presets", name + ".toml");
     if (!path) {
       return Error{"the preset " + model::quoted(name) +
-                   " is neither beside this one nor among the "
-                   "program's own"};
+                   " is neither beside this one nor in the program's folders"};
     }
-    if (*path == scene_.path) {
-      return Error{"a morph cannot go through itself"};
+    if (*path == preset_path) {
+      return Error{"a morph cannot contain its own preset"};
     }
     SceneOptions options = options_;
     options.is_stop = true;
@@ -328,86 +434,38 @@ class SceneReader {
     return scene_of(std::move(reading));
   }
 
-  // The keys: as the options say, else as the preset does.
-  bool tune() {
-    Preset& preset = scene_.preset;
-    const fs::path folder = fs::path(scene_.path).parent_path();
-    const auto path_of = [&](const std::string& said, const std::string& name) {
-      return !said.empty() || name.empty() ? said : (folder / name).string();
+  // Reads the tuning of the options, else the preset's. Empty without a scale and a keyboard map.
+  Stage<std::vector<double>> read_keys(const std::string& scene_path, const Preset& preset) {
+    using Keys = std::vector<double>;
+    const fs::path folder = fs::path(scene_path).parent_path();
+    const auto path_of = [&](const std::string& option, const std::string& name) {
+      return !option.empty() || name.empty() ? option : (folder / name).string();
     };
     const std::string scale = path_of(options_.keys.scale, preset.scale);
     const std::string map = path_of(options_.keys.keyboard_map, preset.keyboard_map);
-    preset.a4_hz = options_.keys.a4_hz.value_or(preset.a4_hz);
-    preset.channels = options_.keys.channels.value_or(preset.channels);
     if (scale.empty() && map.empty()) {
-      return true;
+      return {Keys(), {}};
     }
     for (const std::string& path : {scale, map}) {
       if (options_.reach == Reach::own_folders && !path.empty() && !own_file(path)) {
-        return fail("", "",
-                    Error{"its tuning is none of the program's own, and OSC loads no others"});
+        return failed<Keys>(finding_of(
+            "", "", {"its tuning is outside the program's folders; OSC cannot load it"}));
       }
     }
     TuningReading tuning = tuning_of(scale, map, files_);
-    if (tuning.failure) {
-      out_.findings.push_back(*std::move(tuning.failure));
-      return false;
-    }
-    preset.keys_hz = std::move(tuning.keys_hz);
-    return true;
+    return tuning.failure ? failed<Keys>(*std::move(tuning.failure))
+                          : Stage<Keys>{std::move(tuning.keys_hz), {}};
   }
 
-  // Several files are one text, one behind the other.
-  bool read_model(const std::vector<std::string>& paths, ReadOptions options) {
-    options.most_nodes = options_.most_nodes;
-    std::string text;
-    int line = 1;
-    for (const std::string& path : paths) {
-      auto more = files_.read(path, max_model_bytes);
-      if (!more) {
-        return fail("", "", more.error());
-      }
-      if (!text.empty() && !text.ends_with('\n')) {
-        text += '\n';
-      }
-      scene_.texts.push_back({path, line});
-      text += *more;
-      line = 1 + lines_of(text);
-    }
-    ParsedNetwork parsed = parse_network(text, options);
-    if (parsed.ok() && !scene_.has_preset) {
-      scene_.preset = default_preset(parsed.network, options_.bare);
-      if (const auto idle = idle_keys(parsed.network, scene_.preset); idle && !options_.bare) {
-        parsed.diagnostics.push_back(
-            {Severity::warning, idle->line, idle->column, 1, idle->message});
-      }
-    }
-    Lines lines(text);
-    for (Diagnostic& diagnostic : parsed.diagnostics) {
-      const std::string source = lines.at(diagnostic.line);
-      const ModelText file = text_at(scene_, diagnostic.line);
-      diagnostic.line -= file.first_line - 1;
-      out_.findings.push_back({file.path, diagnostic, source});
-      if (diagnostic.severity == Severity::warning) {
-        scene_.warnings.push_back(to_string(out_.findings.back()));
-      }
-    }
-    scene_.model_path = paths.front();
-    scene_.third = parsed.third;
-    scene_.motion = std::move(parsed.motion);
-    const bool ok = parsed.ok();
-    scene_.network = std::move(parsed.network);
-    return ok;
-  }
-
-  // What a preset names is beside it, or among the program's own or the player's `kind`.
-  std::optional<std::string> find_beside(const std::string& kind, const std::string& name) {
-    const fs::path folder = fs::path(scene_.path).parent_path();
-    std::vector<fs::path> tried = {folder / name, folder / ".." / kind / name,
-                                   fs::path(models_folder()).parent_path() / kind / name};
+  // Finds a file that a preset names: beside it, in the user's folder or in the program's.
+  std::optional<std::string> find_beside(const std::string& preset_path, const std::string& kind,
+                                         const std::string& name) {
+    const fs::path folder = fs::path(preset_path).parent_path();
+    std::vector<fs::path> tried = {folder / name, folder / ".." / kind / name};
     if (const std::string user = user_folder(); !user.empty()) {
-      tried.insert(tried.end() - 1, fs::path(user) / kind / name);
+      tried.push_back(fs::path(user) / kind / name);
     }
+    tried.push_back(fs::path(models_folder()).parent_path() / kind / name);
     for (const fs::path& path : tried) {
       if (options_.reach == Reach::own_folders) {
         if (const auto own = own_file(path.string())) {
@@ -422,9 +480,7 @@ class SceneReader {
   }
 
   const SceneOptions options_;
-  SceneFiles files_;
-  Scene scene_;
-  Reading out_;
+  SceneFiles files_;  // records every file that was read or looked for
 };
 
 }  // namespace
@@ -440,7 +496,7 @@ Finding finding_of(const std::string& file, std::string_view text, const Error& 
 }
 
 Finding finding_in_model(const Scene& scene, const Error& error) {
-  const ModelText file = text_at(scene, error.line);
+  const ModelText file = text_at(scene.texts, error.line);
   Error there = error;
   there.line -= error.line > 0 ? file.first_line - 1 : 0;
   const auto text = read_text(file.path, max_model_bytes);
@@ -464,7 +520,7 @@ std::string with_source(const Finding& finding) {
   for (std::size_t i = 0; i < finding.source.size(); ++i) {
     const auto c = static_cast<unsigned char>(finding.source[i]);
     shown += c == '\t' || (c >= 0x20 && c != 0x7f) ? finding.source[i] : '?';
-    const bool continues = (c & 0xc0) == 0x80;  // a letter of several bytes is one place wide
+    const bool continues = (c & 0xc0) == 0x80;  // a UTF-8 character has one mark
     if (i < first + length && !continues) {
       mark += i < first ? (c == '\t' ? '\t' : ' ') : i == first ? '^' : '~';
     }
@@ -475,8 +531,7 @@ std::string with_source(const Finding& finding) {
   return text + "\n    " + shown + "\n    " + mark;
 }
 
-// Every word of a source stands in quotes, or behind the ':', ';' or '?' that follows what is
-// wrong.
+// Source text appears only in quotes, or after the ':', ';' or '?' that ends the problem.
 std::string without_source(std::string_view message) {
   const auto is_letter = [](std::string_view text, std::size_t at) {
     return at < text.size() && std::isalnum(static_cast<unsigned char>(text[at])) != 0;
@@ -492,7 +547,7 @@ std::string without_source(std::string_view message) {
     }
     const std::string_view place = line.substr(0, place_end);
     line.remove_prefix(place_end + sign.size());
-    // A source may have quotes too: from the first that opens to the last that closes.
+    // The source may contain quotes: remove from the first opening to the last closing quote.
     std::size_t open = line.find('\'');
     while (open != line.npos && is_letter(line, open - 1)) {
       open = line.find('\'', open + 1);
@@ -535,7 +590,7 @@ Result<Scene> scene_of(Reading&& reading) {
     return *std::move(reading.scene);
   }
   std::string all;
-  for (const Finding& finding : reading.findings) {  // a warning may explain an error
+  for (const Finding& finding : reading.findings) {  // warnings too, as one may explain an error
     all += (all.empty() ? "" : "\n") + to_string(finding);
   }
   return Error{std::move(all)};

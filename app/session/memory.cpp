@@ -13,18 +13,18 @@ namespace {
 
 constexpr auto unknown = std::numeric_limits<std::uint64_t>::max();
 
-// The first number of a file of one.
+// Returns the number in a file that has only one.
 std::uint64_t number_in(const char* path) {
   std::ifstream file(path);
   std::uint64_t number = 0;
-  return file >> number ? number : unknown;  // "max" is none
+  return file >> number ? number : unknown;  // "max" means no limit
 }
 
 std::uint64_t left_of(std::uint64_t limit, std::uint64_t used) {
   return limit == unknown ? unknown : limit - std::min(limit, used);
 }
 
-// The number after a name in a file of such pairs.
+// Returns the number after a name in a file of such pairs.
 std::uint64_t number_at(const char* path, const std::string& wanted) {
   std::ifstream file(path);
   std::string word;
@@ -37,7 +37,7 @@ std::uint64_t number_at(const char* path, const std::string& wanted) {
   return unknown;
 }
 
-// What may be had without taking it from anybody.
+// Memory available without swapping.
 std::uint64_t left_by_machine() {
   const std::uint64_t kilobytes = number_at("/proc/meminfo", "MemAvailable:");
   return kilobytes == unknown ? unknown : kilobytes << 10;
@@ -52,7 +52,7 @@ std::uint64_t left_by_limit() {
   return left_of(limit.rlim_cur, pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)));
 }
 
-// Files that are kept in memory make room when it is needed.
+// The kernel can drop cached files, so they count as free.
 std::uint64_t left_by_group() {
   const std::uint64_t limit = number_in("/sys/fs/cgroup/memory.max");
   const std::uint64_t used = number_in("/sys/fs/cgroup/memory.current");

@@ -1,4 +1,4 @@
-// app/session: how much memory there is to take.
+// app/session: free memory.
 #pragma once
 
 #include <cstdint>
@@ -7,8 +7,8 @@
 
 namespace ressort::session {
 
-// What the machine has free, or what `ulimit -v` and the control group leave of it, in bytes.
-// [any thread but audio]
+// Returns the memory in bytes that the machine, `ulimit -v` and the control group leave free. [any
+// thread but audio]
 std::uint64_t free_memory_bytes();
 
 }  // namespace ressort::session

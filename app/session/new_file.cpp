@@ -15,14 +15,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int most_links = 40;       // as the kernel has it
-constexpr int most_leftovers = 100;  // left behind by what was killed
+constexpr int most_links = 40;       // the kernel's limit
+constexpr int most_leftovers = 100;  // from killed programs
 
 Error cannot_write(const std::string& path) {
   return {"'" + path + "' cannot be written: " + std::generic_category().message(errno)};
 }
 
-// Where a name leads to, through links that may lead to nothing yet.
+// Resolves links, even if their target does not exist.
 std::string behind_links(const std::string& path) {
   fs::path place = path;
   std::error_code error;
@@ -33,7 +33,7 @@ std::string behind_links(const std::string& path) {
   return place.string();
 }
 
-// "take.wav" is "take.part.wav" until it is whole, so that its ending tells what it is.
+// "take.wav" is "take.part.wav" until it is complete, so that the ending stays.
 std::string part_of(const std::string& place, int number) {
   const fs::path path = place;
   const std::string part = number == 1 ? ".part" : ".part" + std::to_string(number);
@@ -98,7 +98,7 @@ Result<NewFile> NewFile::open(const std::string& path, Existing existing, bool i
     return cannot_write(path);
   }
   file.written_ = std::move(name);
-  if (is_there) {  // whoever could read the old one can read the new one
+  if (is_there) {  // keep the permissions
     static_cast<void>(!fchmod(file.descriptor_, there.st_mode & 07777));
   }
   return file;
@@ -124,7 +124,7 @@ Result<Done> NewFile::keep() {
     written_.clear();
     return Done{};
   }
-  // What came there meanwhile is not to be lost either, where the file system can promise that.
+  // Do not overwrite a file that was created meanwhile, if the file system supports that.
   const bool may_replace = existing_ == Existing::replace;
   int failed = renameat2(AT_FDCWD, written_.c_str(), AT_FDCWD, place_.c_str(),
                          may_replace ? 0 : RENAME_NOREPLACE);

@@ -1,5 +1,5 @@
-// app/session: files that are written. One takes its place when it is whole; until then, and if it
-// never is, what was there before stays as it was.
+// app/session: writes files atomically. A file gets its name when it is complete; until then, the
+// previous file stays.
 #pragma once
 
 #include <span>
@@ -10,35 +10,34 @@
 
 namespace ressort::session {
 
-enum class Existing { refuse, replace };  // what a file that is already there is for a new one
+enum class Existing { refuse, replace };  // whether to overwrite an existing file
 
 class NewFile {
  public:
-  // `is_shown`: where nothing is there yet it is written under its own name from the start, so that
-  // even what is killed is found there. Otherwise it is NAME.part.ENDING until it is kept. Links
-  // stay: what they lead to is replaced. A device or a pipe is written as it is.
+  // Opens a file for writing. `is_shown`: a new file has its own name from the start, so that it
+  // can be found if the program is killed. Otherwise it is NAME.part.ENDING until keep(). Links are
+  // followed. Devices and pipes are written directly.
   static Result<NewFile> open(const std::string& path, Existing existing, bool is_shown = false);
   NewFile(NewFile&& other) noexcept;
   NewFile& operator=(NewFile&&) = delete;
-  ~NewFile();  // what was not kept is gone
+  ~NewFile();  // deletes the file unless it was kept
 
   int descriptor() const { return descriptor_; }
   Result<Done> write(const std::string& text);
-  // It is whole.
+  // Gives the complete file its name.
   Result<Done> keep();
 
  private:
   NewFile() = default;
 
-  std::string path_;     // as it was asked for
-  std::string place_;    // behind all links
-  std::string written_;  // its name so far; empty: a device's or a pipe's, not to be removed
+  std::string path_;     // as requested
+  std::string place_;    // with links resolved
+  std::string written_;  // temporary name; empty for devices and pipes
   Existing existing_ = Existing::refuse;
   int descriptor_ = -1;
 };
 
-// Fails where `output` is one of the files that were read, under whatever name. Empty names are
-// passed over.
+// Fails if `output` is one of the files that were read, by any name. Ignores empty names.
 Result<Done> spare(const std::string& output, std::span<const std::string> read);
 
 }  // namespace ressort::session

@@ -13,8 +13,8 @@
 namespace ressort::session {
 namespace {
 
-constexpr std::chrono::milliseconds poll_time{10};  // the ring holds seconds
-constexpr double unknown_rate_hz = 44100.0;         // until the first block tells
+constexpr std::chrono::milliseconds poll_time{10};  // the ring holds several seconds
+constexpr double unknown_rate_hz = 44100.0;         // replaced at the first block
 
 }  // namespace
 
@@ -28,11 +28,11 @@ struct Recorder::Work {
   std::optional<SoundWriter> file;
   double rate_hz = unknown_rate_hz;  // of the file
   int channels = 2;
-  std::uint64_t frames = 0;       // written so far
-  std::uint64_t lost_before = 0;  // the meter's reading at the start
-  std::uint64_t unfit = 0;        // chunks that came with another number of channels
-  std::optional<Error> failure;   // ends it
-  std::vector<float> samples;     // of one round, so that the disk gets few large pieces
+  std::uint64_t frames = 0;       // frames written
+  std::uint64_t lost_before = 0;  // Meters::record_lost at the start
+  std::uint64_t unfit = 0;        // chunks with another number of channels
+  std::optional<Error> failure;   // ends the recording
+  std::vector<float> samples;     // of one round, written together
 
   std::mutex mutex;
   std::condition_variable wake;
@@ -55,8 +55,7 @@ struct Recorder::Work {
     return Done{};
   }
 
-  // The file is open before its form is known. The first chunk tells, and if it is another one, it
-  // is opened anew.
+  // Reopens the file if the first chunk has another rate or number of channels than expected.
   void take_form_of(const RecordedChunk& chunk) {
     const double rate_now = process.clock.read().rate_hz;
     if (chunk.channels != channels || rate_now != rate_hz) {
@@ -94,7 +93,7 @@ struct Recorder::Work {
     frames += count;
   }
 
-  // Completes the file, of as much as there is.
+  // Completes the file.
   void end() {
     if (file) {
       auto closed = failure ? file->salvage() : file->close();
@@ -113,7 +112,7 @@ struct Recorder::Work {
       if (failure) {
         process.is_recording.lower();
         end();
-        has_failed.raise();  // first: who is told may ask
+        has_failed.raise();  // first, because `tell` may ask
         tell(failure->message);
         return;
       }
@@ -138,7 +137,7 @@ Result<Done> Recorder::start(const std::string& path, Existing existing) {
   if (is_running()) {
     return Error{"a recording to '" + work.path + "' is going on"};
   }
-  static_cast<void>(stop());  // one that has ended by itself
+  static_cast<void>(stop());  // one that ended by itself
   const double rate_now = work.process.clock.read().rate_hz;
   work.path = path;
   work.existing = existing;

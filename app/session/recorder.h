@@ -1,4 +1,4 @@
-// app/session: writes what sounds to a sound file, from a thread of its own.
+// app/session: records the output to a sound file, on a thread of its own.
 #pragma once
 
 #include <functional>
@@ -15,15 +15,15 @@ class Recorder {
  public:
   using Tell = std::function<void(const std::string&)>;
 
-  // `tell` gets what ends a recording by itself; on the recorder's thread.
+  // `tell` receives the error if a recording ends by itself; on the recorder's thread.
   Recorder(Process& process, Tell tell);
   ~Recorder();
 
-  // Starts a recording of everything that is heard; 24 bit. What is killed can be read as far as it
-  // went. [control]
+  // Starts a 24-bit recording of the output. If the program is killed, the file is readable up to
+  // that moment. [control]
   Result<Done> start(const std::string& path, Existing existing);
-  // Ends it, the file being complete, and says how long it is and how many chunks were lost. An
-  // error after one that ended by itself, once.
+  // Ends the recording and completes the file. Returns its length and the number of lost chunks.
+  // Returns the error of a recording that ended by itself, once.
   Result<std::string> stop();
   bool is_running() const;
 

@@ -23,15 +23,15 @@ namespace fs = std::filesystem;
 
 struct Kind {
   std::string_view ending;
-  int form;               // libsndfile's
-  std::string_view mark;  // its first bytes
+  int form;               // of libsndfile
+  std::string_view mark;  // first bytes of a file
   bool holds_floats;
   bool ends_at_4_gb;
-  bool keeps_header;  // can be told how long it is while it grows; the others need not be
+  bool keeps_header;  // has a header with the length, to be updated while recording
 };
 
 constexpr Kind kinds[] = {
-    {".wav", SF_FORMAT_WAV, "RIFF", true, false, true},  // becomes RF64
+    {".wav", SF_FORMAT_WAV, "RIFF", true, false, true},  // larger files are RF64
     {".w64", SF_FORMAT_W64, "riff", true, false, true},
     {".flac", SF_FORMAT_FLAC, "fLaC", false, false, false},
     {".ogg", SF_FORMAT_OGG, "OggS", false, false, false},
@@ -40,8 +40,8 @@ constexpr Kind kinds[] = {
     {".au", SF_FORMAT_AU, ".snd", true, true, true},
     {".caf", SF_FORMAT_CAF, "caff", true, false, true},
 };
-constexpr double most_bytes = 4294967295.0 - 1048576.0;  // of samples, beside a header
-constexpr std::chrono::milliseconds header_age{500};     // and then it is written anew
+constexpr double most_bytes = 4294967295.0 - 1048576.0;  // of samples; the rest is for the header
+constexpr std::chrono::milliseconds header_age{500};     // interval of header updates
 
 const Kind* kind_of(const std::string& path) {
   std::string ending = fs::path(path).extension().string();
@@ -52,7 +52,7 @@ const Kind* kind_of(const std::string& path) {
   return found == std::end(kinds) ? nullptr : &*found;
 }
 
-// A sound of any kind, whole or not, or nothing at all.
+// Returns true for an empty file or a sound file, complete or not.
 bool may_be_replaced(const std::string& path) {
   char first[4] = {};
   std::ifstream file(path, std::ios::binary);
@@ -126,11 +126,10 @@ std::size_t SoundReader::read(double* interleaved, std::size_t frames) {
 
 namespace {
 
-// What libsndfile writes goes through our own callbacks, which see every error, also those at the
-// end.
+// I/O functions for libsndfile that remember the first error, also one at closing.
 struct Tape {
   int descriptor = -1;
-  int error = 0;  // the first
+  int error = 0;  // errno of the first error
 
   static sf_count_t length(void* tape) {
     struct stat file {};
@@ -263,7 +262,7 @@ Result<SoundWriter> SoundWriter::open(const std::string& path, const SoundForm& 
     return file->failure();
   }
   sf_command(file->handle, SFC_SET_CLIPPING, nullptr, SF_TRUE);
-  // No peak chunk: it holds the time of day, and the same render shall give the same file.
+  // No peak chunk, because it has a time stamp: the same render gives the same file.
   sf_command(file->handle, SFC_SET_ADD_PEAK_CHUNK, nullptr, SF_FALSE);
   if (may_grow) {
     sf_command(file->handle, SFC_RF64_AUTO_DOWNGRADE, nullptr, SF_TRUE);

@@ -1,4 +1,4 @@
-// app/session: sound files, read and written block by block.
+// app/session: reads and writes sound files block by block.
 #pragma once
 
 #include <memory>
@@ -14,12 +14,12 @@ namespace ressort::session {
 
 enum class SampleFormat { float32, float64, pcm24 };
 
-// ".wav" and the other endings of sound files that can be written.
+// Returns the file endings that can be written: ".wav" and others.
 const std::vector<std::string_view>& sound_endings();
 
 class SoundReader {
  public:
-  // An ordinary file in any form that libsndfile knows.
+  // Opens a regular file in any format of libsndfile.
   static Result<SoundReader> open(const std::string& path);
   SoundReader(SoundReader&&) noexcept;
   SoundReader& operator=(SoundReader&&) noexcept;
@@ -27,8 +27,8 @@ class SoundReader {
 
   double rate_hz() const;
   std::size_t channels() const;
-  long long frames() const;  // as the file says; negative: it does not
-  // The next frames, interleaved; how many there were. Fewer at the end.
+  long long frames() const;  // from the header; negative: unknown
+  // Reads the next frames, interleaved. Returns their number, which is smaller at the end.
   std::size_t read(double* interleaved, std::size_t frames);
 
  private:
@@ -37,7 +37,7 @@ class SoundReader {
   std::unique_ptr<File> file_;
 };
 
-// A whole sound in memory: channels of one length; 1 is full scale.
+// A sound in memory. All channels have one length; 1 is full scale.
 struct Sound {
   double rate_hz = 44100.0;
   std::vector<std::vector<double>> channels;
@@ -48,28 +48,28 @@ Result<Sound> read_sound(const std::string& path);
 struct SoundForm {
   double rate_hz = 44100.0;
   int channels = 2;
-  std::optional<SampleFormat> samples = {};        // these and no others
-  SampleFormat preferred = SampleFormat::float32;  // otherwise, where the file can hold them
-  std::optional<long long> frames = {};            // as many as will come, where that is known
-  bool is_shown = false;                           // as a NewFile's
+  std::optional<SampleFormat> samples = {};        // required format
+  SampleFormat preferred = SampleFormat::float32;  // otherwise, if the file type supports it
+  std::optional<long long> frames = {};            // expected number, if it is known
+  bool is_shown = false;                           // see NewFile
 };
 
-// Writes as it goes. What is killed is found as long as it was a second before.
+// Writes a sound file. After a crash, the file is complete up to the last second.
 class SoundWriter {
  public:
-  // The ending chooses the form. What can be replaced is a sound or empty, never another file. A
-  // .wav of more than 4 GB becomes RF64.
+  // Opens a file for writing; the ending selects the type. Overwrites only sound files and empty
+  // files. A .wav of more than 4 GB becomes RF64.
   static Result<SoundWriter> open(const std::string& path, const SoundForm& form,
                                   Existing existing);
   SoundWriter(SoundWriter&&) noexcept;
   SoundWriter& operator=(SoundWriter&&) noexcept;
-  ~SoundWriter();  // what was not closed is gone
+  ~SoundWriter();  // deletes the file unless it was closed
 
   Result<Done> write(const double* interleaved, std::size_t frames);
   Result<Done> write(const float* interleaved, std::size_t frames);
-  // The file is complete and takes its name; or there is an error, and none.
+  // Completes the file and gives it its name, or deletes it after an error.
   Result<Done> close();
-  // After a write that failed: what came before it takes the name.
+  // Keeps the file after a failed write, up to that write.
   Result<Done> salvage();
 
  private:

@@ -17,7 +17,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 constexpr std::chrono::microseconds longest{3000};  // for all parts
 constexpr std::size_t least_blocks = 3;
-constexpr double most_steps = 1e6;  // of all voices in a sample: more are not waited for
+constexpr double most_steps = 1e6;  // a sample, of all voices; larger parts are not measured
 
 template <class T>
 double measured_ns(const Program& program, std::size_t voices, Isa isa, Clock::duration patience) {

@@ -10,7 +10,7 @@
 #include "app/commands/timbre/description.h"
 #include "app/exit_code.h"
 #include "app/session/admit.h"
-#include "app/session/changes/settings.h"
+#include "app/session/current_scene.h"
 #include "app/session/files.h"
 #include "app/session/load_news.h"
 #include "app/session/loader.h"

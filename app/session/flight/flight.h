@@ -1,5 +1,5 @@
-// app/session: a flight: what was played since the program began, and from what: enough to play the
-// same samples once more.
+// app/session: a flight: everything that was played since the start, with the scenes. It reproduces
+// the same samples.
 #pragma once
 
 #include <cstdint>
@@ -16,27 +16,27 @@
 
 namespace ressort::session {
 
-// What an engine was made of.
+// The inputs of an engine's compilation.
 struct FlightEngine {
-  std::uint32_t number = 0;  // FlightRecord::count of its take
+  std::uint32_t number = 0;  // FlightRecord::count of its take record
   std::uint32_t serial = 0;
   bool lets_ring = false;
   bool has_new_numbers = false;
   std::string path;                                     // of the scene
-  std::shared_ptr<const std::vector<SceneFile>> files;  // all that the scene is read from
-  std::vector<Setting> kept;  // values that parameters had by then, in place of the texts'
+  std::shared_ptr<const std::vector<SceneFile>> files;  // all files of the scene
+  std::vector<Setting> kept;  // present parameter values, which override the texts'
   double rate_hz = 0.0;
   std::uint32_t most_modes = 0;
   bool find_gain = false;
   bool force = false;
-  double gain = 1.0;  // of the preset that was compiled, whatever its text says
+  double gain = 1.0;  // of the compiled preset, which may differ from its text
 };
 
-// How all of them are compiled.
+// Options common to all engines.
 struct FlightSetup {
   bool rescale = true;
   int voices = 0;
-  NoteShare::Part share;  // of the notes, of which all are recorded
+  NoteShare::Part share;  // the part of the notes that was played; all notes are recorded
   Precision precision = Precision::float64;
   std::optional<Method> method;
   std::optional<Budget> budget;
@@ -45,39 +45,38 @@ struct FlightSetup {
 };
 
 struct Flight {
-  std::string made_by;  // program, version, commit
-  std::string isa;      // what the kernels were compiled for
+  std::string made_by;  // name, version and commit of the program
+  std::string isa;      // instruction set of the kernels
   FlightSetup setup;
   std::vector<FlightEngine> engines;
   std::vector<FlightRecord> records;
-  std::int64_t end_frame = 0;     // one past the last that was played
-  bool has_audio_inputs = false;  // which are not kept
+  std::int64_t end_frame = 0;     // one past the last frame played
+  bool has_audio_inputs = false;  // sound at audio inputs is not recorded
 };
 
-// As text, in lines; the texts of models and presets are in it, whole.
+// Returns the flight as text lines, with the whole texts of models and presets.
 std::string print_flight(const Flight& flight);
 
-// Back; an error has the line.
+// Parses such a text. An error has its line.
 Result<Flight> parse_flight(std::string_view text);
 
 inline constexpr std::size_t max_flight_bytes = std::size_t{256} << 20;
-inline constexpr double flight_heard_s = 30.0;  // of its end; what was before is computed only
+inline constexpr double flight_heard_s = 30.0;  // the end is played, the rest only computed
 
-// Whether a name is that of a flight's file.
+// Returns true for a flight's file name.
 bool names_flight(std::string_view name);
 
-// Reads the scene of an engine from the flight's own texts and makes the engine. [any thread but
-// audio]
+// Reads an engine's scene from the flight's texts and compiles it. [any thread but audio]
 Result<std::unique_ptr<Engine>> make_flight_engine(const Flight& flight,
                                                    const FlightEngine& engine);
 
-// Puts parameters of what was read to other values; gives back those that the texts have.
+// Replaces parameter values in a scene. Returns the values that the texts have.
 std::vector<Setting> keep_values(Scene& scene, std::span<const Setting> kept);
 
-// Collects a flight beside the sound. [one thread]
+// Collects a flight while it is played. [one thread]
 class FlightLog {
  public:
-  // More, and what was first is not known any more.
+  // Limits. Beyond them, the beginning of the flight is lost.
   static constexpr std::size_t most_records = std::size_t{1} << 19;
   static constexpr std::size_t most_engines = 10'000;
   static constexpr std::size_t most_text_bytes = std::size_t{64} << 20;
@@ -85,21 +84,21 @@ class FlightLog {
   explicit FlightLog(FlightSetup setup) { flight_.setup = std::move(setup); }
 
   void add(FlightEngine engine, bool has_audio_inputs);
-  // All that there is by now.
+  // Reads all records so far.
   void drain(Process& process);
-  // Whether an engine has sounded yet.
+  // Returns true once an engine has played.
   bool has_begun() const;
-  // Nothing before the first engine, and once it has become more than is kept.
+  // Returns the flight so far, or an error before the first engine and beyond the limits.
   Result<Flight> flight() const;
 
  private:
   void forget();
 
   Flight flight_;
-  std::deque<FlightRecord> records_;  // its records: it grows without moving
-  std::vector<std::shared_ptr<const std::vector<SceneFile>>> texts_;  // of its engines
+  std::deque<FlightRecord> records_;  // a deque, which grows without moving
+  std::vector<std::shared_ptr<const std::vector<SceneFile>>> texts_;  // without duplicates
   std::size_t text_bytes_ = 0;
-  std::string lost_;  // why the beginning is not known; empty: it is
+  std::string lost_;  // reason why the beginning is lost; empty: it is complete
 };
 
 }  // namespace ressort::session

@@ -14,7 +14,7 @@ bool names_flight(std::string_view name) {
 std::vector<Setting> keep_values(Scene& scene, std::span<const Setting> kept) {
   std::vector<Setting> written;
   for (const Setting& setting : kept) {
-    // What a preset says goes before what the model says.
+    // The preset's value overrides the model's.
     std::optional<double> before;
     for (Parameter& parameter : scene.network.parameters) {
       if (parameter.name == setting.parameter) {
@@ -62,7 +62,7 @@ Result<std::unique_ptr<Engine>> make_flight_engine(const Flight& flight,
 }
 
 void FlightLog::add(FlightEngine engine, bool has_audio_inputs) {
-  // Who loads the same again has one text of it.
+  // Repeated loads of a scene share one text.
   const auto known = std::find_if(texts_.begin(), texts_.end(), [&](const auto& files) {
     return std::equal(files->begin(), files->end(), engine.files->begin(), engine.files->end(),
                       [](const SceneFile& a, const SceneFile& b) {
@@ -99,7 +99,7 @@ void FlightLog::drain(Process& process) {
     } else if (records_.size() >= most_records) {
       lost_ = "more than " + std::to_string(most_records) + " events have been played";
     }
-    // What is no number says nothing to an engine.
+    // Engines ignore NaN and infinity.
     const bool is_number = std::isfinite(record.event.value) && std::isfinite(record.event.value2);
     if (lost_.empty() && is_number) {
       records_.push_back(record);
@@ -133,7 +133,7 @@ Result<Flight> FlightLog::flight() const {
   Flight now = flight_;
   now.made_by = std::string(version) + " " + commit;
   now.isa = isa_name(best_isa());
-  // What has come since the last look at the time belongs to the next block.
+  // Later records belong to the next block.
   std::copy_if(records_.begin(), records_.end(), std::back_inserter(now.records),
                [&](const FlightRecord& record) { return record.frame < now.end_frame; });
   return now;

@@ -1,5 +1,5 @@
-// A flight as text: a line says what it is and has its numbers behind it; of a text that is whole,
-// it has how many bytes follow, and its name.
+// The text format of flights: a line begins with a word and has numbers after it. An embedded file
+// has a line with its size in bytes and its name.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -139,7 +139,7 @@ void print(FlightWriter& out, const FlightRecord& record) {
 
 // --- reading ------------------------------------------------------------------------------------
 
-// Words of a line, one after the other; what is missing or is none is remembered.
+// The words of a line, read in order. `ok` becomes false at a missing or invalid word.
 class LineWords {
  public:
   explicit LineWords(std::string_view line) : rest_(line) {}
@@ -362,7 +362,7 @@ std::string print_flight(const Flight& flight) {
   out.line("end", flight.end_frame);
   out.line("audio_inputs", flight.has_audio_inputs ? 1 : 0);
   print(out, flight.setup);
-  std::map<const std::vector<SceneFile>*, std::size_t> texts;  // those that are written, by number
+  std::map<const std::vector<SceneFile>*, std::size_t> texts;  // written texts and their numbers
   for (const FlightEngine& engine : flight.engines) {
     const auto [written, is_new] = texts.try_emplace(engine.files.get(), texts.size());
     if (is_new) {

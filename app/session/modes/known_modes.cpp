@@ -24,7 +24,7 @@ constexpr double worth_keeping_s = 0.2;
 constexpr std::size_t most_kept_bytes = std::size_t{64} << 20;
 constexpr double endless = std::numeric_limits<double>::infinity();
 
-// Where the modes of this very network are kept, if anywhere.
+// Returns the cache file for the modes of this network; empty without a cache folder.
 std::string place_of(const Scene& scene, const std::vector<double>& parameters,
                      const ModeOptions& options) {
   const std::string folder = cache_folder();
@@ -58,7 +58,7 @@ json json_of(const KnownModes& modes) {
           {"residual", modes.residual}};
 }
 
-// Nothing where somebody else wrote the file, or only a part of it is there.
+// Returns nothing if the file is incomplete or not ours.
 std::optional<KnownModes> kept(const std::string& place, const ModeOptions& options) {
   const auto text = read_text(place, most_kept_bytes);
   if (!text) {
@@ -177,7 +177,7 @@ std::string note_name(double frequency_hz) {
 }
 
 std::optional<double> frequency_of(const std::string& text) {
-  constexpr std::string_view letters = "C D EF G A B";  // by their semitones
+  constexpr std::string_view letters = "C D EF G A B";  // position is the semitone
   double hertz = 0.0;
   if (parse_number(text, hertz)) {
     return hertz > 0.0 ? std::optional(hertz) : std::nullopt;

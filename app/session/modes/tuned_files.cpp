@@ -59,7 +59,7 @@ Result<std::string> keep_tuned(const std::string& model, const std::string& name
   return written ? Result<std::string>(path) : written.error();
 }
 
-// FNV-1a, twice
+// Returns two 64-bit FNV-1a hashes with different offset bases, in hexadecimal.
 std::string digest(const std::string& text) {
   std::string out;
   for (std::uint64_t hash : {0xcbf29ce484222325u, 0x9ae16a3b2f90404fu}) {

@@ -1,4 +1,4 @@
-// app/session: where tuned models are until somebody saves them.
+// app/session: tuned models in the user's cache.
 #pragma once
 
 #include <string>
@@ -13,17 +13,17 @@ struct TunedFiles {
   std::string preset;
 };
 
-// In a folder of the user's cache that no other text has, which is made: of this name.
+// Returns paths in a cache folder for this text, and creates the folder.
 Result<TunedFiles> tuned_files(const std::string& name, const std::string& model_text);
 
-// Whether a model is one of these.
+// Returns true if the model is in that cache.
 bool is_tuned(const std::string& model);
 
-// Copies it among the user's own models, where it is NAME.mdl; its path.
+// Copies a tuned model to the user's models as NAME.mdl, and returns its path.
 Result<std::string> keep_tuned(const std::string& model, const std::string& name,
                                Existing existing);
 
-// Digits that tell one text from another.
+// Returns a content hash of a text.
 std::string digest(const std::string& text);
 
 }  // namespace ressort::session

@@ -18,9 +18,9 @@
 namespace ressort::session {
 namespace {
 
-constexpr double missed_by = 0.1;  // of what is noticed: less is as good as there
+constexpr double missed_by = 0.1;  // in JND: a smaller deviation counts as reached
 
-// The unit that ends a figure's name, from its '_' on; or nothing.
+// Returns the suffix of a figure's name from its '_' on, or an empty string.
 std::string_view unit_of(AskedFigure figure) {
   const std::string_view name = row_of(figure).name;
   for (const std::string_view unit : {"_hz", "_ms", "_s"}) {
@@ -50,7 +50,7 @@ std::string told(AskedFigure figure, double value) {
          unit;
 }
 
-// The first line that a parameter could take the place of a number in.
+// Returns an error that names the first line where a parameter could replace a number.
 Error nothing_to_turn(const Scene& scene) {
   const Network& network = scene.network;
   if (!network.parameters.empty()) {
@@ -93,7 +93,7 @@ std::optional<Error> not_linear(const Scene& scene) {
   return std::nullopt;
 }
 
-// The blows that the preset gives at velocity 100 of a key, and else one sample at its first input.
+// Returns the preset's strikes for this key at velocity 100, or one sample at the first input.
 std::vector<StrikePulse> blows_of(const ShapeRequest& request) {
   constexpr double usual_velocity = 100.0 / 127.0;
   const Scene& scene = request.scene;
@@ -124,7 +124,7 @@ std::vector<StrikePulse> blows_of(const ShapeRequest& request) {
   return blows.empty() ? std::vector<StrikePulse>{{}} : blows;
 }
 
-// "a blow of 0.3 ms at in1", "blows at in1 and 5 more".
+// Returns "a blow of 0.3 ms at in1", or "blows at in1 and 5 more".
 std::string told(const std::vector<StrikePulse>& blows, const Network& network) {
   const std::string first = " at in" + std::to_string(network.inputs[blows[0].input].number);
   if (blows.size() > 1) {
@@ -218,7 +218,7 @@ Result<Shaped> shape_timbre(const ShapeRequest& request, std::vector<TimbreTarge
                                             : Error{scene.name + ": " + found.error().message};
   }
   shaped.found = *std::move(found);
-  if (!options.has_attack) {  // which is told all the same
+  if (!options.has_attack) {  // shown even if it is no target
     const auto attack = static_cast<std::size_t>(AskedFigure::attack);
     shaped.found.before[attack] = model.attack_ms(request.values);
     shaped.found.reached[attack] = model.attack_ms(shaped.found.values);

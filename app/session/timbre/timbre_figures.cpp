@@ -71,7 +71,7 @@ constexpr TemporalFigure of_time[] = {
     {"t60_s", t60_of},
 };
 
-// What a figure is called below `low`, up to `high`, and above; and where it has grown or shrunk.
+// The words for a figure below `low`, up to `high` and above, and for a rise and a fall.
 struct Word {
   std::string_view figure;
   double low;
@@ -106,7 +106,7 @@ const Word decay{"", 0.3, 2.0, "short", "neither short nor long", "long",
                  "", "",  2,   " s",    "the T60 of its decay"};
 
 std::string told(const Word& word, double value) {
-  constexpr double most = 1e5;  // nobody hears more
+  constexpr double most = 1e5;  // larger numbers are inaudible
   return (value > most ? "over " : "") +
          with_commas(std::min(value, most), value < 1000.0 ? word.digits : 0) +
          std::string(word.unit);

@@ -1,5 +1,4 @@
-// app/session: the figures of timbre by the names that files, messages and people know them by, and
-// the words that musicians have for them. Pure.
+// app/session: names of timbre figures in files and messages, and musicians' words for them. Pure.
 #pragma once
 
 #include <cstddef>
@@ -15,34 +14,34 @@
 
 namespace ressort::session {
 
-// Of a frame. Three figures are called tristimulus, one after the other.
+// A figure of one frame. The three tristimulus figures follow each other.
 struct TimbreFigure {
   std::string_view name;  // with its unit
   std::optional<double> (*of)(const FrameTimbre& timbre);
 };
 std::span<const TimbreFigure> timbre_figures();
 
-// [figure] Where one is absent, there is nothing to tell.
+// [figure] An absent figure is not printed.
 using FigureValues = std::vector<std::optional<double>>;
 FigureValues figures_of(const FrameTimbre& timbre);
 
-// The index of the figure of this name, the first of several.
+// Returns the index of the first figure of this name.
 std::size_t figure_number(std::string_view name);
 
-// Of a whole sound.
+// A figure of a whole sound.
 struct TemporalFigure {
   std::string_view name;
   std::optional<double> (*of)(const TemporalShape& shape);
 };
 std::span<const TemporalFigure> temporal_figures();
 
-// "1,812", with so many digits after the point.
+// Returns "1,812", with this number of decimals.
 std::string with_commas(double number, int digits);
 
-// A line for each figure that musicians have a word for, the word first: "bright: 1,812 Hz, the
-// centroid of the spectrum". Where `before` has another value, by 2 % at least, it says what it has
-// become: "brighter: 1,812 Hz, the centroid of the spectrum; was 1,204 Hz". Where a word begins is
-// a matter of taste, the figure is not.
+// Returns a line for each figure that musicians have a word for: "bright: 1,812 Hz, the centroid of
+// the spectrum". If `before` differs by at least 2 %, the line shows the change: "brighter: 1,812
+// Hz, the centroid of the spectrum; was 1,204 Hz". The limits between words are a matter of taste;
+// the figures are not.
 std::vector<std::string> timbre_words(const FigureValues& now,
                                       const std::optional<TemporalShape>& temporal = {},
                                       const FigureValues& before = {});

@@ -10,7 +10,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds poll_time{
-    10};  // of blocks of 16 the ring holds a third of a second
+    10};  // a third of a second of blocks of 16 frames fits into the ring
 constexpr std::size_t most_frames = 94;
 
 std::size_t recent_samples(double rate_hz) {
@@ -80,11 +80,11 @@ void TimbreWatch::work() {
   }
 }
 
-// What comes from now on, until nobody listens any more, or the rate is another one.
+// Analyses the output until nobody listens or the rate changes.
 void TimbreWatch::hear() {
   const double rate_hz = process_.clock.read().rate_hz;
   RecordedChunk chunk;
-  while (process_.listening.pop(chunk)) {  // what is left from the last time
+  while (process_.listening.pop(chunk)) {  // left from the last time
   }
   {
     const std::lock_guard lock(mutex_);
@@ -92,7 +92,7 @@ void TimbreWatch::hear() {
     recent_.clear();
     rate_hz_ = rate_hz;
   }
-  // A block may have told the rate no sooner than it comes.
+  // The rate may be unknown until the first block.
   FrameStream stream({.rate_hz = rate_hz > 0.0 ? rate_hz : 48000.0, .size = frame}, hop,
                      [this](std::size_t, const FrameTimbre& timbre, const FrameAnalysis&) {
                        const std::lock_guard lock(mutex_);
@@ -105,7 +105,7 @@ void TimbreWatch::hear() {
   std::vector<double> samples;
   bool goes_on = true;
   while (goes_on) {
-    // A full ring has lost what came after it: what follows is another piece of sound.
+    // A full ring has lost chunks, so the next chunk does not continue the last one.
     const bool is_whole = process_.listening.size() < process_.listening.capacity();
     samples.clear();
     while (process_.listening.pop(chunk)) {
@@ -123,7 +123,7 @@ void TimbreWatch::hear() {
         recent_.size() > enough) {
       recent_.erase(recent_.begin(), recent_.end() - static_cast<std::ptrdiff_t>(enough));
     }
-    // Frames after what they were made of: who has seen the last frame finds its samples.
+    // Samples first: a reader that sees a frame finds its samples.
     lock.unlock();
     stream.add(samples);
     lock.lock();

@@ -1,5 +1,5 @@
-// app/session: what the sound is like while it plays, 94 frames a second at 48 kHz, from a thread
-// of its own that runs while somebody wants to know.
+// app/session: measures the timbre of the output while it plays, 94 times a second at 48 kHz, on a
+// thread that runs while somebody listens.
 #pragma once
 
 #include <chrono>
@@ -16,33 +16,33 @@
 
 namespace ressort::session {
 
-// Of the mean of all outputs, 2048 samples under a Hann window, 512 from one to the next; of
-// amplitudes. Two channels at 48 kHz take 0.7 % of a core.
+// Analyses the mean of all outputs: amplitude spectra of 2048 samples, Hann window, hop of 512. Two
+// channels at 48 kHz take 0.7 % of a core.
 class TimbreWatch {
  public:
   static constexpr std::size_t frame = 2048;
   static constexpr std::size_t hop = 512;
 
-  // The process must outlive it.
+  // The process must outlive this object.
   explicit TimbreWatch(Process& process) : process_(process) {}
   ~TimbreWatch();
 
-  // From now on for so long at least. [any thread but audio]
+  // Analyses the output for at least this time from now. [any thread but audio]
   void listen(std::chrono::duration<double> time);
 
   struct Heard {
-    std::uint64_t number = 0;  // of the frame, from 1 on: since this program's first
-    FrameTimbre timbre;        // without a pitch, nothing harmonic
+    std::uint64_t number = 0;  // number of the frame, from 1
+    FrameTimbre timbre;        // without pitch and harmonics
   };
-  // Those after a number, the last second's at most. [any thread but audio]
+  // Returns the frames after a number, at most those of the last second. [any thread but audio]
   std::vector<Heard> since(std::uint64_t number) const;
 
   struct Moment {
     std::optional<double> f0_hz;
     FigureValues figures;
   };
-  // The last frame with its harmonics, whose f0 is that of the last 0.3 s: once so much has been
-  // heard. O(a few ms) [any thread but audio]
+  // Returns the latest frame with harmonics, with the f0 of the last 0.3 s, once that much was
+  // heard. Takes a few ms. [any thread but audio]
   std::optional<Moment> now() const;
 
  private:
@@ -50,15 +50,15 @@ class TimbreWatch {
   void hear();
 
   Process& process_;
-  mutable std::mutex mutex_;  // all below
+  mutable std::mutex mutex_;  // guards all below
   std::condition_variable wake_;
   bool stop_ = false;
   std::chrono::steady_clock::time_point until_;
   std::uint64_t number_ = 0;
   std::deque<Heard> frames_;
-  std::vector<double> recent_;  // the last samples, as many as a pitch needs or a few more
+  std::vector<double> recent_;  // latest samples, slightly more than pitch detection needs
   double rate_hz_ = 0.0;
-  std::thread thread_;  // since the first listen()
+  std::thread thread_;  // started by the first listen()
 };
 
 }  // namespace ressort::session

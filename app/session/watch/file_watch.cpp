@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What was created is written next, and then closed; a link is whole at once.
+// A link is complete at once; a new file is written and closed later.
 bool is_link(const fs::path& path) {
   struct stat status {};
   return lstat(path.c_str(), &status) == 0 && (S_ISLNK(status.st_mode) || status.st_nlink > 1);
@@ -50,7 +50,7 @@ bool FileWatch::follow(const std::vector<std::string>& paths) {
     const int watch = inotify_add_watch(descriptor_, folder.c_str(),
                                         IN_CLOSE_WRITE | IN_MOVED_TO | IN_CREATE | IN_ONLYDIR);
     if (watch < 0) {
-      continue;  // no such folder
+      continue;  // the folder does not exist
     }
     const auto before = names_.find(watch);
     for (const std::string& name : its_names) {
@@ -79,7 +79,7 @@ bool FileWatch::has_changed() {
       const char* const name = buffer.data() + at + sizeof event;
       at += sizeof event + event.len;
       if ((event.mask & IN_Q_OVERFLOW) != 0) {
-        has_changed = true;  // something, nobody knows what
+        has_changed = true;  // overflow: assume that a file has changed
         continue;
       }
       const auto names = names_.find(event.wd);

@@ -1,4 +1,4 @@
-// app/session: whether files have changed, as whoever edits them changes them. [one thread]
+// app/session: detects changes of files. [one thread]
 #pragma once
 
 #include <map>
@@ -10,8 +10,8 @@
 
 namespace ressort::session {
 
-// By inotify, so not on file systems of other machines. Folders are watched, not files: editors put
-// a new file in the old one's place.
+// Uses inotify, which does not work on network file systems. Watches folders instead of files,
+// because editors replace a file by a new one.
 class FileWatch {
  public:
   FileWatch();
@@ -21,12 +21,12 @@ class FileWatch {
 
   bool is_open() const { return descriptor_ >= 0; }
 
-  // These from now on, links and what they lead to; those too that are not there yet. True if any
-  // of them was not followed before: what happened to it until now is not known.
+  // Watches these files from now on, including links and their targets and files that do not exist
+  // yet. Returns true if any file was not watched before and may have changed unnoticed.
   bool follow(const std::vector<std::string>& paths);
 
-  // Whether any of them was written and closed, or put in its place, since the last call. Returns
-  // at once.
+  // Returns true if any file was written and closed, or replaced, since the last call. Returns at
+  // once.
   bool has_changed();
 
  private:

@@ -337,7 +337,7 @@ TEST_CASE("a preset reads several models as one, and says in which a mistake is"
   CHECK(scene->network.links.size() == 1);
   REQUIRE(scene->warnings.size() == 1);
   CHECK(has(scene->warnings[0],
-            "both.toml:1:9: warning: no [[control]] follows, so neither keys nor sound"));
+            "both.toml:1:9: warning: there is no [[control]], so neither keys nor sound"));
   const auto played = load_scene(
       folder.write("played.toml",
                    "model = \"string.mdl\"\nwith = [\"box.mdl\"]\n[[control]]\nfrom = \"note\"\n"

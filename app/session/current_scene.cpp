@@ -1,0 +1,286 @@
+#include "app/session/current_scene.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "app/session/files.h"
+#include "app/text.h"
+#include "core/curve.h"
+#include "core/model/preset/edit.h"
+
+namespace ressort::session {
+namespace {
+
+// Returns false for controllers that are no knobs: bank select, data entry, parameter numbers,
+// pedals, and channel mode messages from 120 on.
+bool is_knob(int controller) {
+  constexpr int others[] = {0, 6, 32, 38, 64, 66, 67, 96, 97, 98, 99, 100, 101};
+  return controller < 120 &&
+         std::find(std::begin(others), std::end(others), controller) == std::end(others);
+}
+
+}  // namespace
+
+CurrentScene::Present CurrentScene::present() const {
+  const std::lock_guard lock(mutex_);
+  return {loaded_, values_};
+}
+
+std::shared_ptr<const Loaded> CurrentScene::loaded() const {
+  const std::lock_guard lock(mutex_);
+  return loaded_;
+}
+
+std::shared_ptr<const std::vector<SceneFile>> CurrentScene::files() const {
+  const std::lock_guard lock(mutex_);
+  return files_;
+}
+
+std::optional<double> CurrentScene::parameter(const std::string& name) const {
+  const std::lock_guard lock(mutex_);
+  const auto& parameters = loaded_->instrument.parameters;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    if (parameters[i].name == name) {
+      return values_[i];
+    }
+  }
+  return std::nullopt;
+}
+
+void CurrentScene::replace(std::shared_ptr<const Loaded> loaded, std::vector<double> values,
+                           std::shared_ptr<const std::vector<SceneFile>> files) {
+  const std::lock_guard lock(mutex_);
+  const bool is_same = loaded_->path == loaded->path;
+  loaded_ = std::move(loaded);
+  values_ = std::move(values);
+  files_ = std::move(files);
+  waiting_target_.reset();
+  std::erase_if(learned_, [&](const LearnedRow& row) {
+    return !is_same || control_of(row.target).model == 0;
+  });
+  for (const LearnedRow& row : learned_) {
+    send_mapping(row, true);
+  }
+}
+
+void CurrentScene::set_plan(Plan plan) {
+  const std::lock_guard lock(mutex_);
+  auto loaded = std::make_shared<Loaded>(*loaded_);
+  loaded->plan = std::move(plan);
+  loaded_ = std::move(loaded);
+}
+
+void CurrentScene::remember(std::span<const TimedEvent> events) {
+  const std::lock_guard lock(mutex_);
+  const auto is_ours = [&](const Event& event) {
+    return event.kind == EventKind::parameter && event.model == loaded_->serial;
+  };
+  std::vector<std::string> names;
+  for (const TimedEvent& timed : events) {
+    if (is_ours(timed.event)) {
+      names.push_back(loaded_->instrument.parameters[timed.event.index].name);
+    }
+  }
+  begin_change(names);
+  for (const TimedEvent& timed : events) {
+    if (is_ours(timed.event)) {
+      values_[timed.event.index] = timed.event.value;
+    }
+  }
+}
+
+// Saves the values of these parameters before they change. A sweep is one change.
+void CurrentScene::begin_change(const std::vector<std::string>& names) {
+  using namespace std::chrono_literals;
+  if (names.empty()) {
+    return;
+  }
+  const auto now = std::chrono::steady_clock::now();
+  LastChange change;
+  for (const std::string& name : names) {
+    const auto& parameters = loaded_->instrument.parameters;
+    for (std::size_t i = 0; i < parameters.size(); ++i) {
+      if (parameters[i].name == name) {
+        change.values.emplace_back(name, values_[i]);
+      }
+    }
+  }
+  const bool continues_last =
+      last_change_ && !last_change_->scene && now - change_time_ < 1s &&
+      std::equal(change.values.begin(), change.values.end(), last_change_->values.begin(),
+                 last_change_->values.end(),
+                 [](const auto& a, const auto& b) { return a.first == b.first; });
+  change_time_ = now;
+  if (!continues_last) {
+    last_change_ = std::move(change);
+  }
+}
+
+LastChange CurrentScene::all_values() const {
+  const std::lock_guard lock(mutex_);
+  LastChange change{.scene = loaded_->path};
+  for (std::size_t i = 0; i < values_.size(); ++i) {
+    change.values.emplace_back(loaded_->instrument.parameters[i].name, values_[i]);
+  }
+  return change;
+}
+
+void CurrentScene::set_last_change(LastChange change) {
+  const std::lock_guard lock(mutex_);
+  last_change_ = change.scene->empty() ? std::nullopt : std::optional(std::move(change));
+}
+
+std::optional<LastChange> CurrentScene::take_last_change() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(last_change_, std::nullopt);
+}
+
+// Returns the parameter or the preset's OSC name; model 0 if there is none of this name.
+LearnedControl CurrentScene::control_of(const std::string& target) const {
+  const Instrument& instrument = loaded_->instrument;
+  for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
+    const ParameterInfo& info = instrument.parameters[i];
+    if (info.name == target && info.audio_input == 0) {
+      return {.kind = EventKind::parameter,
+              .index = static_cast<std::uint16_t>(i),
+              .model = loaded_->serial,
+              .low = info.minimum,
+              .high = info.maximum,
+              .exponential = is_wide(info.minimum, info.maximum)};
+    }
+  }
+  for (const CustomInfo& info : instrument.custom) {
+    if (info.address == target) {
+      return {.kind = EventKind::custom,
+              .index = static_cast<std::uint16_t>(info.row),
+              .model = loaded_->serial};
+    }
+  }
+  return {};
+}
+
+void CurrentScene::send_mapping(const LearnedRow& row, bool is_on) {
+  process_.lessons.push({static_cast<std::uint8_t>(row.controller),
+                         is_on ? control_of(row.target) : LearnedControl{}});
+}
+
+Result<Done> CurrentScene::learn(const std::string& target) {
+  const std::uint64_t turns = process_.meters().turns;
+  const std::lock_guard lock(mutex_);
+  if (control_of(target).model == 0) {
+    std::vector<std::string> known;
+    for (const ParameterInfo& info : loaded_->instrument.parameters) {
+      known.push_back(info.name);
+    }
+    for (const CustomInfo& info : loaded_->instrument.custom) {
+      known.push_back(info.address);
+    }
+    return Error{"there is no parameter or control '" + target + "'; there are " +
+                 (known.empty() ? "none" : joined(known, ", ")) + did_you_mean(target, known)};
+  }
+  waiting_target_ = target;
+  turns_before_ = turns;
+  return Done{};
+}
+
+std::size_t CurrentScene::unlearn(const std::string& target) {
+  const std::lock_guard lock(mutex_);
+  waiting_target_.reset();
+  const auto is_forgotten = [&](const LearnedRow& row) {
+    return target.empty() || row.target == target;
+  };
+  for (const LearnedRow& row : learned_) {
+    if (is_forgotten(row)) {
+      send_mapping(row, false);
+    }
+  }
+  return std::erase_if(learned_, is_forgotten);
+}
+
+std::vector<LearnedRow> CurrentScene::learned() const {
+  const std::lock_guard lock(mutex_);
+  return learned_;
+}
+
+std::optional<LearnedRow> CurrentScene::assign_moved_controller(const Meters& now) {
+  const std::lock_guard lock(mutex_);
+  if (!waiting_target_ || now.turns == turns_before_ || !is_knob(now.last_controller)) {
+    return std::nullopt;
+  }
+  const LearnedRow row{now.last_controller, *std::exchange(waiting_target_, std::nullopt)};
+  for (const LearnedRow& before : learned_) {
+    if (before.target == row.target) {
+      send_mapping(before, false);
+    }
+  }
+  std::erase_if(learned_, [&](const LearnedRow& before) {
+    return before.target == row.target || before.controller == row.controller;
+  });
+  learned_.push_back(row);
+  send_mapping(row, true);
+  return row;
+}
+
+Result<std::string> CurrentScene::preset_text(const std::string& model, double extra_gain) const {
+  const std::lock_guard lock(mutex_);
+  if (loaded_->serial == 0) {
+    return Error{"nothing is loaded that could be saved"};
+  }
+  PresetChanges changes;
+  changes.parameters = changed_settings(loaded_->instrument.parameters, loaded_->preset, values_);
+  for (const LearnedRow& row : learned_) {
+    const LearnedControl control = control_of(row.target);
+    for (const ControlSetting& setting : loaded_->preset.controls) {
+      if (setting.source == ControlSource::osc && setting.address == row.target) {
+        ControlSetting same = setting;
+        same.source = ControlSource::controller;
+        same.number = row.controller;
+        changes.learned.push_back(std::move(same));
+      }
+    }
+    if (control.kind == EventKind::parameter) {
+      changes.learned.push_back({.source = ControlSource::controller,
+                                 .number = row.controller,
+                                 .target = row.target,
+                                 .gesture = Gesture::parameter,
+                                 .low = control.low,
+                                 .high = control.high,
+                                 .exponential = control.exponential});
+    }
+  }
+  changes.model = model;
+  changes.gain = loaded_->instrument.gain / extra_gain;
+  Preset generated = loaded_->preset;
+  generated.model = changes.model;
+  return edit_preset(loaded_->preset_text.empty() ? print_preset(generated) : loaded_->preset_text,
+                     changes);
+}
+
+std::vector<ParameterSetting> changed_settings(const std::vector<ParameterInfo>& parameters,
+                                               const Preset& preset,
+                                               std::span<const double> values) {
+  constexpr double most = 1e12;  // largest number in a preset
+  std::vector<ParameterSetting> changed;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const ParameterInfo& info = parameters[i];
+    const bool is_in_preset =
+        std::any_of(preset.parameters.begin(), preset.parameters.end(),
+                    [&](const ParameterSetting& setting) { return setting.name == info.name; });
+    if (info.audio_input == 0 && (is_in_preset || values[i] != info.value)) {
+      changed.push_back(
+          {info.name, values[i], std::max(info.minimum, -most), std::min(info.maximum, most)});
+    }
+  }
+  return changed;
+}
+
+std::string model_name_elsewhere(const std::string& model_path) {
+  const std::filesystem::path path(model_path);
+  std::error_code error;
+  const std::string known = session::model_path(path.stem().string());
+  const bool is_known = !known.empty() && std::filesystem::equivalent(known, path, error);
+  return is_known ? path.filename().string()
+                  : std::filesystem::absolute(path, error).lexically_normal().string();
+}
+
+}  // namespace ressort::session

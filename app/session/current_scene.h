@@ -1,0 +1,120 @@
+// app/session: the playing scene with a player's changes: parameters, undo, learned controllers.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "app/realtime/process.h"
+#include "app/session/loader.h"
+#include "core/compile/compile.h"
+
+namespace ressort::session {
+
+// A loaded scene as people see it. Immutable once published.
+struct Loaded {
+  std::uint32_t serial = 0;
+  std::string name;
+  std::string path;
+  std::string model_path;
+  std::string description;
+  Preset preset;
+  std::string preset_text;  // empty if the preset was generated
+  Instrument instrument;
+  Plan plan;
+  double load_ms = 0.0;  // to read, parse and compile it
+  std::vector<std::string> warnings;
+};
+
+// A controller and its learned target: a parameter, or a control's OSC name.
+struct LearnedRow {
+  int controller = 0;
+  std::string target;
+};
+
+// A change that can be undone: the previous values of parameters, after loading `scene` if there is
+// one.
+struct LastChange {
+  std::optional<std::string> scene;
+  std::vector<std::pair<std::string, double>> values;
+};
+
+// All functions: [any thread but audio], unless they say otherwise.
+class CurrentScene {
+ public:
+  explicit CurrentScene(Process& process) : process_(process) {}
+
+  // The scene and the values of its parameters at one moment.
+  struct Present {
+    std::shared_ptr<const Loaded> loaded;
+    std::vector<double> values;  // [parameter]
+  };
+  Present present() const;
+  // Never null. Before the first load, it has no name and no parameters.
+  std::shared_ptr<const Loaded> loaded() const;
+  std::shared_ptr<const std::vector<SceneFile>> files() const;  // null before the first load
+  std::optional<double> parameter(const std::string& name) const;
+
+  // Replaces the scene. Learned controllers survive if it has the same path and the same targets.
+  // [worker]
+  void replace(std::shared_ptr<const Loaded> loaded, std::vector<double> values,
+               std::shared_ptr<const std::vector<SceneFile>> files);
+  // Replaces the plan of the scene. [worker]
+  void set_plan(Plan plan);
+
+  // Records parameter events that a queue has accepted, as a change that can be undone.
+  void remember(std::span<const TimedEvent> events);
+
+  // Returns everything that a load of another scene changes.
+  LastChange all_values() const;
+  void set_last_change(LastChange change);
+  // Returns the last change and forgets it. Changes of the same parameters within a second are one.
+  std::optional<LastChange> take_last_change();
+
+  // The next knob that moves gets this target. See Session::learn().
+  Result<Done> learn(const std::string& target);
+  // Forgets the controllers of this target, or all if it is empty. Returns how many.
+  std::size_t unlearn(const std::string& target);
+  std::vector<LearnedRow> learned() const;
+  // Gives the waiting target to the controller that has moved. Returns the pair. [worker]
+  std::optional<LearnedRow> assign_moved_controller(const Meters& now);
+
+  // Returns the preset with the present values and learned controllers, and with this model.
+  // `extra_gain` is the factor that the session applies to all presets.
+  Result<std::string> preset_text(const std::string& model, double extra_gain) const;
+
+ private:
+  // All of these: with the lock held.
+  void begin_change(const std::vector<std::string>& names);
+  LearnedControl control_of(const std::string& target) const;
+  void send_mapping(const LearnedRow& row, bool is_on);
+
+  Process& process_;
+  mutable std::mutex mutex_;  // guards all below, and the writing side of process_.lessons
+  std::shared_ptr<const Loaded> loaded_ = std::make_shared<Loaded>();
+  std::vector<double> values_;  // [parameter]
+  std::shared_ptr<const std::vector<SceneFile>> files_;
+  std::optional<LastChange> last_change_;
+  std::chrono::steady_clock::time_point change_time_;
+  std::vector<LearnedRow> learned_;
+  std::optional<std::string> waiting_target_;  // gets the next controller that moves
+  std::uint64_t turns_before_ = 0;             // Meters::turns when the waiting began
+};
+
+// Returns the parameters to save in a preset, with their ranges: those that the preset has and
+// those that differ from their start values. `values`: [parameter].
+std::vector<ParameterSetting> changed_settings(const std::vector<ParameterInfo>& parameters,
+                                               const Preset& preset,
+                                               std::span<const double> values);
+
+// Returns the name by which a preset in another folder refers to a model: its file name if that
+// finds it, else its absolute path. Blocks on the disk.
+std::string model_name_elsewhere(const std::string& model_path);
+
+}  // namespace ressort::session

@@ -1,0 +1,38 @@
+// app/session: messages about problems of the audio thread, limited in number.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include "app/realtime/process.h"
+#include "app/realtime/rate_limit.h"
+#include "core/compile/compile.h"
+
+namespace ressort::session {
+
+// [worker]
+class ProblemReports {
+ public:
+  explicit ProblemReports(Precision precision) : precision_(precision) {}
+
+  // A voice of this model became unstable.
+  void add_reset(const std::string& model);
+  // The load is too high.
+  void add_overload(const Report& report);
+  // Adds late and dropped events since the last call.
+  void add_lost_events(const Meters& now);
+  // Reports what is due.
+  void report(const std::function<void(const std::string&)>& tell);
+
+ private:
+  Precision precision_;
+  RateLimit resets_;
+  RateLimit overloads_{std::chrono::seconds(10)};
+  RateLimit late_;
+  RateLimit dropped_;
+  std::uint64_t late_seen_ = 0;
+  std::uint64_t dropped_seen_ = 0;
+};
+
+}  // namespace ressort::session

@@ -1,0 +1,217 @@
+#include "app/session/scene_builder.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "app/session/admit.h"
+#include "app/session/load_news.h"
+#include "app/session/memory.h"
+#include "app/session/timing.h"
+
+namespace ressort::session {
+namespace {
+
+// Returns true if another compilation may find a cheaper plan. A plan with exact modes is final:
+// inaudible modes are left out, so no other form can continue its state.
+bool may_gain(const Plan& plan) {
+  const auto any = [&](auto&& is_so) {
+    return std::any_of(plan.parts.begin(), plan.parts.end(), is_so);
+  };
+  return any([](const Part& part) { return part.may_gain; }) &&
+         !any([](const Part& part) { return part.method == Method::modal; });
+}
+
+}  // namespace
+
+// Inputs of the compilation of a draft.
+struct SceneBuilder::Prepared {
+  Scene scene;
+  std::optional<Scene> as_read;  // while its files are watched
+  std::vector<Setting> written;  // values in the texts that `Draft::kept` replaces
+  CompileOptions options;
+  FlightEngine made_of;
+};
+
+SceneBuilder::SceneBuilder(const SessionOptions& options, Tell tell, WorkQueue& queue,
+                           CurrentScene& current, EngineSupply& engines, SceneWatch& watch)
+    : options_(options),
+      tell_(std::move(tell)),
+      queue_(queue),
+      current_(current),
+      engines_(engines),
+      watch_(watch) {}
+
+Result<std::shared_ptr<const Loaded>> SceneBuilder::load(const LoadRequest& request) {
+  LoadNews news(request.name, tell_);
+  bool was_stopped = false;
+  const Progress progress([&](std::string_view stage) {
+    news.at(stage);
+    was_stopped = queue_.has_newer_load();
+    return !was_stopped;
+  });
+  try {
+    auto draft = read(request, progress);
+    auto result = draft ? play(request, *std::move(draft), progress) : draft.error();
+    return was_stopped && !result ? Error{queue_.reason_to_stop()} : result;
+  } catch (const std::exception& error) {
+    return Error{"'" + request.name + "' could not be loaded: " + describe(error)};
+  }
+}
+
+SceneOptions SceneBuilder::scene_options(const LoadRequest& request,
+                                         const Progress& progress) const {
+  return {.bare = options_.compile.bare,
+          .third = options_.third,
+          .reach = request.reach,
+          .keys = options_.keys,
+          .progress = progress};
+}
+
+Result<Draft> SceneBuilder::read(const LoadRequest& request, const Progress& progress) const {
+  const auto start = std::chrono::steady_clock::now();
+  Reading reading = read_scene(request.name, scene_options(request, progress));
+  auto files = std::make_shared<const std::vector<SceneFile>>(std::move(reading.files));
+  auto scene = scene_of(std::move(reading));
+  if (!scene) {
+    return scene.error();
+  }
+  return Draft{.scene = *std::move(scene), .files = std::move(files), .start = start};
+}
+
+SceneBuilder::Prepared SceneBuilder::prepare(const LoadRequest& request, Draft draft,
+                                             const Progress& progress) const {
+  Prepared prepared{.scene = std::move(draft.scene), .options = options_.compile};
+  Scene& scene = prepared.scene;
+  if (watch_.is_on()) {
+    prepared.as_read = scene;
+  }
+  prepared.written = keep_values(scene, draft.kept);
+  scene.preset.gain *= options_.gain;
+  CompileOptions& options = prepared.options;
+  options.rate_hz = queue_.rate_hz();
+  options.find_gain = !scene.has_preset;
+  options.most_modes = quick_modes;
+  options.force = request.force;
+  options.progress = progress;
+  options.most_bytes = free_memory_bytes();
+  prepared.made_of = {.lets_ring = request.lets_ring,
+                      .path = scene.path,
+                      .files = std::move(draft.files),
+                      .kept = std::move(draft.kept),
+                      .rate_hz = options.rate_hz,
+                      .most_modes = options.most_modes,
+                      .find_gain = options.find_gain,
+                      .force = options.force,
+                      .gain = scene.preset.gain};
+  return prepared;
+}
+
+Result<std::shared_ptr<const Loaded>> SceneBuilder::play(const LoadRequest& request, Draft draft,
+                                                         const Progress& progress) {
+  const auto start = draft.start;
+  const bool continues_state = draft.continues_state;
+  Prepared prepared = prepare(request, std::move(draft), progress);
+  const Scene& scene = prepared.scene;
+  CompileOptions& options = prepared.options;
+  std::vector<std::string> warnings = scene.warnings;
+  auto compiled = admit(scene, options, warnings);
+  if (!compiled) {
+    return compiled.error();
+  }
+  const bool is_improvable = may_gain(compiled->plan);
+  if (!is_improvable) {  // else improve() warns
+    if (std::string warning = too_much(compiled->plan, compiled->instrument.voices, options.rate_hz,
+                                       options.precision);
+        !warning.empty()) {
+      warnings.push_back(std::move(warning));
+    }
+  }
+  const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
+  FlightEngine& made_of = prepared.made_of;
+  made_of.has_new_numbers = continues_state && engines_.newest() != nullptr &&
+                            can_renumber(engines_.newest()->machine(), compiled->engine->machine());
+  if (!made_of.has_new_numbers) {
+    engines_.begin_new_serial();
+  }
+  std::vector<double> values;
+  for (ParameterInfo& info : compiled->instrument.parameters) {
+    values.push_back(info.value);
+    for (const Setting& written : prepared.written) {
+      info.value = written.parameter == info.name ? written.value : info.value;
+    }
+  }
+  const auto loaded =
+      std::make_shared<const Loaded>(Loaded{.serial = engines_.serial(),
+                                            .name = scene.name,
+                                            .path = scene.path,
+                                            .model_path = scene.model_path,
+                                            .description = scene.preset.description,
+                                            .preset = scene.preset,
+                                            .preset_text = scene.preset_text,
+                                            .instrument = std::move(compiled->instrument),
+                                            .plan = std::move(compiled->plan),
+                                            .load_ms = took.count(),
+                                            .warnings = std::move(warnings)});
+  engines_.prepare_audio_inputs(loaded->instrument.audio_inputs);
+  current_.replace(loaded, std::move(values), made_of.files);
+  queue_.set_built_rate(options.rate_hz);
+  engines_.offer(std::move(compiled->engine), scene.network, made_of,
+                 loaded->instrument.audio_inputs > 0);
+  watch_.set_as_read(std::move(prepared.as_read));
+  watch_.follow(*made_of.files);
+  improvable_.reset();
+  if (is_improvable) {
+    options.find_gain = false;
+    options.most_modes = patient_modes;
+    options.progress = {};
+    prepared.scene.preset.gain = loaded->instrument.gain;
+    improvable_ = {std::move(prepared.scene.network), std::move(prepared.scene.preset), options,
+                   std::move(made_of)};
+  }
+  return loaded;
+}
+
+void SceneBuilder::improve() {
+  const Improvable source = *std::exchange(improvable_, std::nullopt);
+  bool was_stopped = false;
+  CompileOptions options = source.options;
+  options.progress = Progress([&](std::string_view) {
+    was_stopped = queue_.has_other_work();
+    return !was_stopped;
+  });
+  options.most_bytes = free_memory_bytes();
+  auto compiled = compile_network(source.network, source.preset, options);
+  if (!compiled) {
+    if (was_stopped) {
+      improvable_ = source;  // try again, unless another scene is loaded
+    }
+    return;
+  }
+  const std::string overload = too_much(compiled->plan, compiled->instrument.voices,
+                                        source.options.rate_hz, source.options.precision);
+  const auto broken = broken_promise(compiled->plan);
+  current_.set_plan(std::move(compiled->plan));
+  FlightEngine made_of = source.made_of;
+  made_of.gain = source.preset.gain;
+  made_of.find_gain = false;
+  made_of.most_modes = source.options.most_modes;
+  made_of.lets_ring = made_of.has_new_numbers = false;
+  engines_.offer(std::move(compiled->engine), source.network, std::move(made_of),
+                 current_.loaded()->instrument.audio_inputs > 0);
+  if (!overload.empty()) {
+    tell_(overload);
+  }
+  if (broken) {
+    tell_(*broken);
+  }
+  measure_parts();
+}
+
+void SceneBuilder::measure_parts() {
+  const auto loaded = current_.loaded();
+  Plan plan = loaded->plan;
+  measure(plan, *engines_.newest(), options_.compile, loaded->instrument.voices);
+  current_.set_plan(std::move(plan));
+}
+
+}  // namespace ressort::session

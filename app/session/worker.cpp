@@ -1,0 +1,402 @@
+#include "app/session/worker.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "app/session/files.h"
+#include "app/session/load_news.h"
+#include "app/session/modes/tuned_files.h"
+#include "app/text.h"
+#include "core/model/language/expression.h"
+#include "core/model/language/print.h"
+
+namespace ressort::session {
+namespace {
+
+TimedEvent parameter_event(const Loaded& loaded, std::size_t index, double value) {
+  return {.event = {.kind = EventKind::parameter,
+                    .index = static_cast<std::uint16_t>(index),
+                    .model = loaded.serial,
+                    .value = value}};
+}
+
+std::string to_text(const std::vector<Setting>& settings) {
+  std::vector<std::string> words;
+  for (const Setting& setting : settings) {
+    words.push_back(setting.parameter + " = " + print_number(setting.value));
+  }
+  return joined(words, ", ");
+}
+
+}  // namespace
+
+Worker::Worker(Process& process, const SessionOptions& options, Tell tell, WorkQueue& queue,
+               CurrentScene& current, FlightRecorder& flights, EngineSupply& engines,
+               SceneWatch& watch)
+    : process_(process),
+      options_(options),
+      tell_(std::move(tell)),
+      queue_(queue),
+      current_(current),
+      flights_(flights),
+      engines_(engines),
+      watch_(watch),
+      builder_(options, tell_, queue, current, engines, watch),
+      problems_(options.compile.precision),
+      thread_([this] { run(); }) {}
+
+Worker::~Worker() {
+  thread_.join();
+}
+
+void Worker::run() {
+  while (auto work = queue_.next()) {
+    try {
+      read_reports();
+      if (work->load) {
+        load(*work->load);
+      } else if (work->inquiry) {
+        try {
+          work->inquiry->work();
+        } catch (const std::exception& error) {
+          work->inquiry->refuse(Error{describe(error)});
+        }
+      } else if (work->has_new_rate) {
+        rebuild_at_new_rate();
+      } else if (watch_.has_changed()) {
+        reload();
+      } else if (builder_.can_improve()) {
+        builder_.improve();
+      }
+    } catch (const std::exception& error) {
+      // The playing scene continues.
+      tell_("error in the background: " + describe(error));
+    }
+  }
+}
+
+Progress Worker::interruptible() const {
+  return Progress([this](std::string_view) { return !queue_.has_newer_load(); });
+}
+
+double Worker::model_rate_hz() const {
+  return options_.compile.rescale ? queue_.built_rate_hz() : Network::reference_rate_hz;
+}
+
+// --- loads --------------------------------------------------------------------------------------
+
+void Worker::load(const LoadJob& job) {
+  LastChange change = current_.all_values();
+  const auto request = job.request.target ? write_tuned(*job.request.target) : job.request;
+  const auto result = request ? builder_.load(*request) : request.error();
+  if (result) {
+    loaded_ = *request;
+    loaded_->lets_ring = false;  // not when it is compiled again
+    current_.set_last_change(std::move(change));
+  }
+  if (job.answer) {
+    job.answer(result);
+  } else if (!result) {
+    tell_(result.error().message);
+  }
+  if (result) {
+    builder_.measure_parts();
+  }
+}
+
+void Worker::rebuild_at_new_rate() {
+  const double rate_hz = queue_.rate_hz();
+  if (!loaded_) {
+    queue_.set_built_rate(rate_hz);
+    return;
+  }
+  const auto result = builder_.load(*loaded_);
+  if (result) {
+    builder_.measure_parts();
+  } else if (!queue_.has_newer_load()) {
+    tell_(result.error().message);
+    queue_.set_built_rate(rate_hz);  // it is not tried again and again
+  }
+}
+
+// Programs are the presets in listed order, starting at bank 0.
+void Worker::change_program(int number) {
+  const std::vector<std::string> presets = known_presets();
+  const std::string program = "program " + std::to_string(number % 128 + 1);
+  const auto index = static_cast<std::size_t>(number);
+  if (index < presets.size()) {
+    const auto answer = [this, name = presets[index], program](const auto& result) {
+      if (result) {
+        tell_(program + ": " + name);
+      } else if (result.error().message != replaced && result.error().message != ending) {
+        tell_(result.error().message);
+      }
+    };
+    queue_.add(
+        LoadJob{{.name = presets[index], .reach = Reach::own_folders, .lets_ring = true}, answer});
+  } else if (unknown_programs_.insert(number).second) {
+    tell_("there is no " + program + " in bank " + std::to_string(number / 128) + "; there are " +
+          counted(presets.size(), "preset", "presets"));
+  }
+}
+
+void Worker::read_reports() {
+  engines_.collect();
+  Report report;
+  std::optional<int> program;  // only the last request counts
+  while (process_.reports.pop(report)) {
+    const auto loaded = current_.loaded();
+    const bool is_current = report.model == loaded->serial;
+    if (report.kind == Report::Kind::parameter && is_current) {
+      const TimedEvent event = parameter_event(*loaded, report.index, report.value);
+      current_.remember({&event, 1});
+    } else if (report.kind == Report::Kind::reset) {
+      problems_.add_reset(is_current ? loaded->name : "the last model");
+    } else if (report.kind == Report::Kind::overload && is_current) {
+      problems_.add_overload(report);
+    } else if (report.kind == Report::Kind::program) {
+      program = static_cast<int>(report.value);
+    }
+  }
+  if (program) {
+    change_program(*program);
+  }
+  const Meters now = process_.meters();
+  if (const auto row = current_.assign_moved_controller(now)) {
+    tell_("controller " + std::to_string(row->controller) + " now controls " + row->target +
+          "; 'unlearn " + row->target + "' ends that, 'save NAME' keeps it");
+  }
+  if (const auto news = flights_.collect(now)) {
+    tell_(*news);
+  }
+  problems_.add_lost_events(now);
+  problems_.report(tell_);
+}
+
+// --- reloads ------------------------------------------------------------------------------------
+
+void Worker::reload() {
+  if (!loaded_) {
+    return;
+  }
+  Reload news;
+  const auto start = std::chrono::steady_clock::now();
+  try {
+    Reading reading = read_scene(loaded_->name, builder_.scene_options(*loaded_, interruptible()));
+    watch_.follow(reading.files);
+    if (reading.scene) {
+      auto done = apply_edit(
+          {.scene = *std::move(reading.scene),
+           .files = std::make_shared<const std::vector<SceneFile>>(std::move(reading.files)),
+           .start = start});
+      news.is_done = static_cast<bool>(done);
+      news.news = done ? *done : done.error().message;
+    } else {
+      news.is_done = false;
+      for (const Finding& finding : reading.findings) {
+        news.news += (news.news.empty() ? "" : "\n") + with_source(finding);
+      }
+    }
+  } catch (const std::exception& error) {
+    news.is_done = false;
+    news.news = error.what();
+  }
+  if (queue_.has_newer_load()) {
+    return;  // the load reports its own result
+  }
+  if (!news.is_done) {
+    news.news += "\nthe scene that was loaded before keeps playing";
+  }
+  watch_.publish(news);
+  tell_(news.news);
+}
+
+// Applies an edited scene with as little change of the sound as possible: changed start values are
+// sent as parameter changes, other changed numbers go into the sounding voices, and everything else
+// is a load. Returns a message about the change, or the error.
+Result<std::string> Worker::apply_edit(Draft draft) {
+  const std::string name = draft.scene.name;
+  const CurrentScene::Present now = current_.present();
+  const auto& known = now.loaded->instrument.parameters;
+  std::vector<Setting> changed;
+  if (const std::optional<Scene>& before = watch_.as_read()) {
+    const std::vector<Setting> starts = start_settings(*before);
+    for (const Setting& start : start_settings(draft.scene)) {
+      const auto was = std::find_if(starts.begin(), starts.end(), [&](const Setting& setting) {
+        return setting.parameter == start.parameter;
+      });
+      if (was != starts.end() && was->value != start.value) {
+        changed.push_back(start);
+      } else if (was != starts.end()) {  // keep what a player has changed
+        for (std::size_t i = 0; i < known.size(); ++i) {
+          if (known[i].name == start.parameter && now.values[i] != known[i].value) {
+            draft.kept.push_back({start.parameter, now.values[i]});
+          }
+        }
+      }
+    }
+    if (differs_in_start_values_only(*before, draft.scene)) {
+      if (changed.empty()) {
+        return name + ": reloaded; the sound is unchanged";
+      }
+      std::vector<TimedEvent> events;
+      for (const Setting& setting : changed) {
+        for (std::size_t i = 0; i < known.size(); ++i) {
+          if (known[i].name == setting.parameter && known[i].audio_input == 0 &&
+              known[i].minimum <= setting.value && setting.value <= known[i].maximum) {
+            events.push_back(parameter_event(*now.loaded, i, setting.value));
+          }
+        }
+      }
+      if (events.size() == changed.size()) {
+        send(events);
+        watch_.set_as_read(std::move(draft.scene));
+        return name + ": " + to_text(changed);
+      }
+    }
+    draft.continues_state = has_same_parameters(before->network, draft.scene.network) &&
+                            differs_in_numbers_only(before->preset, draft.scene.preset) &&
+                            before->third == draft.scene.third &&
+                            before->has_preset == draft.scene.has_preset;
+  }
+  LoadNews news(name, tell_);
+  const Progress progress([&](std::string_view stage) {
+    news.at(stage);
+    return !queue_.has_newer_load();
+  });
+  const std::uint32_t serial = engines_.serial();
+  const auto result = builder_.play(*loaded_, std::move(draft), progress);
+  if (!result) {
+    return result.error();
+  }
+  builder_.measure_parts();
+  std::string text = name + (serial == engines_.serial() ? ": new numbers" : ": loaded again") +
+                     " in " + fixed((*result)->load_ms, 1) + " ms" +
+                     (changed.empty() ? "" : "; " + to_text(changed));
+  for (const std::string& warning : (*result)->warnings) {
+    text += "\n" + warning;
+  }
+  return text;
+}
+
+bool Worker::send(const std::vector<TimedEvent>& events) {
+  const bool is_sent = process_.send(process_.from_session, events);
+  if (is_sent) {
+    current_.remember(events);
+  }
+  return is_sent;
+}
+
+// --- modes and timbre ---------------------------------------------------------------------------
+
+Result<Scene> Worker::read_current(const CurrentScene::Present& now,
+                                   const Progress& progress) const {
+  if (now.loaded->serial == 0) {
+    return Error{"nothing is loaded"};
+  }
+  auto scene = load_scene(now.loaded->path, builder_.scene_options({}, progress));
+  if (scene && scene->network.parameters.size() != now.values.size()) {
+    return Error{"the model's file was changed since it was loaded; load it again"};
+  }
+  return scene;
+}
+
+Result<KnownModes> Worker::find_modes(std::size_t count) {
+  const CurrentScene::Present now = current_.present();
+  const ModeOptions options{
+      .rate_hz = queue_.rate_hz(), .count = count, .progress = interruptible()};
+  const auto scene = read_current(now, options.progress);
+  return scene ? known_modes(*scene, now.values, options) : scene.error();
+}
+
+Result<Shaped> Worker::shape(const std::vector<TimbreTarget>& targets) {
+  constexpr int usual_key = 57;
+  const CurrentScene::Present now = current_.present();
+  const Progress progress = interruptible();
+  const auto scene = read_current(now, progress);
+  if (!scene) {
+    return scene.error();
+  }
+  const Instrument& instrument = now.loaded->instrument;
+  const Meters meters = process_.meters();
+  const ShapeRequest request{
+      .scene = *scene,
+      .parameters = instrument.parameters,
+      .values = now.values,
+      .has_keys = scene->has_preset && instrument.mode.has_value(),
+      .key = meters.notes == 0
+                 ? usual_key
+                 : meters.last_notes[(meters.notes - 1) % meters.last_notes.size()].key,
+      .rate_hz = model_rate_hz(),
+      .progress = progress};
+  auto shaped = shape_timbre(request, targets);
+  if (!shaped) {
+    return shaped;
+  }
+  if (request.has_keys) {
+    std::vector<Setting> values;
+    for (std::size_t i = 0; i < now.values.size(); ++i) {
+      if (instrument.parameters[i].audio_input == 0) {
+        values.push_back({instrument.parameters[i].name, shaped->found.values[i]});
+      }
+    }
+    const auto done = retune(std::move(values), progress);
+    return done ? std::move(shaped) : Result<Shaped>(done.error());
+  }
+  std::vector<TimedEvent> events;
+  for (std::size_t i = 0; i < now.values.size(); ++i) {
+    if (shaped->found.values[i] != now.values[i]) {
+      events.push_back(parameter_event(*now.loaded, i, shaped->found.values[i]));
+    }
+  }
+  return send(events) ? std::move(shaped)
+                      : Result<Shaped>(Error{"the audio thread is busy; try again"});
+}
+
+Result<Done> Worker::retune(std::vector<Setting> values, const Progress& progress) {
+  auto draft = builder_.read(*loaded_, progress);
+  if (!draft) {
+    return draft.error();
+  }
+  LastChange change = current_.all_values();
+  draft->kept = std::move(values);
+  draft->continues_state = differs_in_numbers_only(current_.loaded()->preset, draft->scene.preset);
+  const auto result = builder_.play(*loaded_, *std::move(draft), progress);
+  if (!result) {
+    return result.error();
+  }
+  current_.set_last_change(std::move(change));
+  builder_.measure_parts();
+  return Done{};
+}
+
+Result<LoadRequest> Worker::write_tuned(const TuneTarget& target) {
+  const CurrentScene::Present now = current_.present();
+  const ModeOptions options{.rate_hz = model_rate_hz(), .progress = interruptible()};
+  const auto scene = read_current(now, options.progress);
+  if (!scene) {
+    return scene.error();
+  }
+  const auto tuned = tune_mode(scene->network, now.values, target, options);
+  if (!tuned) {
+    return tuned.error();
+  }
+  const std::string model = print_network(tuned->network);
+  const auto files = tuned_files(now.loaded->name, model);
+  if (!files) {
+    return files.error();
+  }
+  const auto preset = current_.preset_text(files->model, options_.gain);
+  if (!preset) {
+    return preset.error();
+  }
+  for (const auto& [path, text] :
+       {std::pair(files->model, model), std::pair(files->preset, *preset)}) {
+    if (auto written = write_text(path, text, Existing::replace); !written) {
+      return written.error();
+    }
+  }
+  return LoadRequest{.name = files->preset};
+}
+
+}  // namespace ressort::session
