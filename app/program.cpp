@@ -19,7 +19,7 @@ int said(int code) {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) {
     return code;
   }
-  std::fputs("the output could not be written whole: is the disk full?\n", stderr);
+  std::fputs("the output is incomplete; the disk may be full\n", stderr);
   return code == exit_code::done ? exit_code::our_failure : code;
 }
 
@@ -37,12 +37,12 @@ int run_program(int (*work)(int argc, char** argv), int argc, char** argv) {
   try {
     return said(work(argc, argv));
   } catch (const std::bad_alloc&) {
-    std::fputs("there is not enough memory; a smaller model or fewer voices take less\n", stderr);
+    std::fputs("not enough memory; use a smaller model or fewer voices\n", stderr);
     return exit_code::wrong_use;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
   } catch (...) {
-    std::fputs("an error without a name\n", stderr);
+    std::fputs("unknown error\n", stderr);
   }
   return exit_code::our_failure;
 }

@@ -89,7 +89,7 @@ class Mouth {
       const int last = descriptor;
       lines_.pop_front();
       if (const std::size_t count = std::exchange(left_out_, 0); count > 0 && !is_silent_) {
-        add(last, "(" + counted(count, "line was", "lines were") + " left out: nobody read them)");
+        add(last, "(" + counted(count, "unread line was", "unread lines were") + " dropped)");
       }
       if (lines_.empty()) {
         idle_.notify_all();

@@ -224,7 +224,7 @@ void open_capture(Alsa& alsa, int wanted) {
   }
   if (failure < 0 || stream.rate_hz != alsa.out.rate_hz) {
     say("the ALSA device '" + alsa.device + "' has no inputs for the model: " +
-        (failure < 0 ? snd_strerror(failure) : "they run at another rate"));
+        (failure < 0 ? snd_strerror(failure) : "their sample rate differs"));
     return;
   }
   stream.packed.resize(stream.channels * alsa.out.frames * 4);
@@ -246,15 +246,14 @@ Result<AudioDevice> open_alsa(Process& process, const AudioOptions& options) {
   alsa->device = options.device;
   int failure = snd_pcm_open(&alsa->out.pcm, options.device.c_str(), SND_PCM_STREAM_PLAYBACK, 0);
   if (failure < 0) {
-    return Error{"the ALSA device '" + options.device +
-                 "' does not open: " + snd_strerror(failure) +
-                 "; 'aplay -L' lists the devices, -d NAME chooses one, -a dummy does without"};
+    return Error{"cannot open the ALSA device '" + options.device + "': " + snd_strerror(failure) +
+                 "; 'aplay -L' lists the devices, -d NAME selects one, -a dummy plays silently"};
   }
   failure = configure(alsa->out, static_cast<unsigned>(std::max(2, options.outputs)),
                       options.rate_hz, static_cast<snd_pcm_uframes_t>(options.period_frames));
   if (failure < 0) {
     return Error{"the ALSA device '" + options.device +
-                 "' takes none of our settings: " + snd_strerror(failure)};
+                 "' rejects all settings: " + snd_strerror(failure)};
   }
   alsa->is_timed = snd_pcm_type(alsa->out.pcm) == SND_PCM_TYPE_NULL;
   alsa->samples.resize(alsa->out.channels * alsa->out.frames);

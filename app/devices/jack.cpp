@@ -351,7 +351,7 @@ Result<AudioDevice> open_jack(Process& process, const AudioOptions& options) {
   jack_on_info_shutdown(jack->client, on_shutdown, jack.get());
   if (!register_ports(*jack) || jack_activate(jack->client) != 0) {
     close();
-    return Error{"the JACK server refused our ports; are there too many clients?"};
+    return Error{"the JACK server registered no ports; there may be too many clients"};
   }
   describe_ports(*jack);
   jack->wiring = options.wiring;

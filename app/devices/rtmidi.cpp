@@ -59,9 +59,9 @@ MidiInput::~MidiInput() = default;
 Result<std::unique_ptr<MidiInput>> MidiInput::open(MidiApi api, const std::string& client_name,
                                                    bool connect, MidiDoor& door) {
   const Error missing{api == MidiApi::alsa
-                          ? "there is no ALSA sequencer (/dev/snd/seq), so no keyboard can be "
-                            "heard through ALSA; play by OSC or from the console"
-                          : "no JACK server answers, so no keyboard can be heard through JACK"};
+                          ? "there is no ALSA sequencer (/dev/snd/seq), so there is no "
+                            "MIDI through ALSA; play by OSC or from the console"
+                          : "no JACK server answers, so there is no MIDI through JACK"};
   if (api == MidiApi::alsa && access("/dev/snd/seq", R_OK | W_OK) != 0) {
     return missing;  // checked here because RtMidi would print an error
   }

@@ -42,8 +42,7 @@ Admission ask_to_play(const Scene& scene, const CompileOptions& options, bool is
   if (stability.complaint) {
     const bool is_refused = stability.verdict == Verdict::unstable && !options.force;
     Error complaint = *stability.complaint;
-    complaint.message +=
-        is_refused ? "; play, render and load take --force, which fades out what runs away" : "";
+    complaint.message += is_refused ? "; pass --force to play it anyway" : "";
     admission.findings.push_back(
         in_model(scene, complaint, is_refused ? Severity::error : Severity::warning));
   }

@@ -154,12 +154,11 @@ Result<std::string> read_bytes(const std::string& path, std::size_t max_bytes) {
     return Error{"'" + path + "' is a folder, not a file"};
   }
   if (!fs::is_regular_file(status)) {
-    return Error{"'" + path + "' is no ordinary file"};
+    return Error{"'" + path + "' is not a regular file"};
   }
   const auto size = fs::file_size(path, error);
   if (!error && size > max_bytes) {
-    return Error{"'" + path + "' has " + in_bytes(size) + "; at most " + in_bytes(max_bytes) +
-                 " are read"};
+    return Error{"'" + path + "' has " + in_bytes(size) + "; the limit is " + in_bytes(max_bytes)};
   }
   std::ifstream file(path, std::ios::binary);
   std::string text(static_cast<std::size_t>(size), '\0');
@@ -211,7 +210,7 @@ Result<std::string> find_scene(const std::string& name, Reach reach) {
       return *found;
     }
     return Error{"there is no model or preset '" + name +
-                 "' in the program's own folders, and OSC loads no others; there are " +
+                 "' in the program's folders, and OSC cannot load others; there are " +
                  (presets.empty() ? "none" : presets) + meant_by(name)};
   }
   for (const fs::path& path : {fs::path(name), fs::path(name + ".toml"), fs::path(name + ".mdl")}) {
@@ -299,8 +298,9 @@ Result<std::string> users_file(const std::string& name, const char* kind, const 
                c == ' ' || c == '.' || c == '_' || c == '-';
       });
   if (!is_name) {
-    return Error{"a " + std::string(kind) +
-                 "'s name has 1 to 64 letters, digits, blanks and ._-, and no . first"};
+    return Error{
+        "a " + std::string(kind) +
+        "'s name has 1 to 64 letters, digits, spaces and ._- and does not begin with a dot"};
   }
   const fs::path user = user_folder();
   if (user.empty()) {
@@ -310,7 +310,7 @@ Result<std::string> users_file(const std::string& name, const char* kind, const 
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) {
-    return Error{"the folder '" + folder.string() + "' cannot be made: " + error.message()};
+    return Error{"cannot create the folder '" + folder.string() + "': " + error.message()};
   }
   return (folder / (name + ending)).string();
 }

@@ -19,7 +19,7 @@ void LoadNews::at(std::string_view stage) {
 
 std::string describe(const std::exception& error) {
   return dynamic_cast<const std::bad_alloc*>(&error) != nullptr
-             ? "there is not enough memory; a smaller model or fewer voices (-p) take less"
+             ? "not enough memory; use a smaller model or fewer voices (-p)"
              : error.what();
 }
 

@@ -288,7 +288,7 @@ class SceneReader {
       const auto model = find_beside(file.path, "models", name);
       if (!model) {
         return Error{options_.reach == Reach::own_folders
-                         ? "its model is outside the program's folders; OSC cannot load it"
+                         ? "its model is outside the program's folders, so OSC cannot load it"
                          : "the model '" + name + "' is neither beside the preset nor in '" +
                                models_folder() + "'"};
       }
@@ -449,7 +449,7 @@ class SceneReader {
     for (const std::string& path : {scale, map}) {
       if (options_.reach == Reach::own_folders && !path.empty() && !own_file(path)) {
         return failed<Keys>(finding_of(
-            "", "", {"its tuning is outside the program's folders; OSC cannot load it"}));
+            "", "", {"its tuning is outside the program's folders, so OSC cannot load it"}));
       }
     }
     TuningReading tuning = tuning_of(scale, map, files_);

@@ -77,7 +77,7 @@ Result<NewFile> NewFile::open(const std::string& path, Existing existing, bool i
     return file.descriptor_ >= 0 ? Result<NewFile>(std::move(file)) : cannot_write(path);
   }
   if (is_there && existing == Existing::refuse) {
-    return Error{"'" + path + "' is there already; --force writes over it"};
+    return Error{"'" + path + "' exists already; --force overwrites it"};
   }
   if (is_there && access(file.place_.c_str(), W_OK) != 0) {
     return cannot_write(path);
@@ -143,8 +143,8 @@ Result<Done> spare(const std::string& output, std::span<const std::string> read)
     std::error_code error;
     if (!input.empty() && fs::equivalent(output, input, error)) {
       return Error{"'" + output + "' " +
-                   (output == input ? "is read" : "is '" + input + "', which is read") +
-                   ": it cannot be written too"};
+                   (output == input ? "is an input" : "is the input '" + input + "'") +
+                   ", so it cannot be the output"};
     }
   }
   return Done{};

@@ -87,7 +87,7 @@ struct Recorder::Work {
     }
     if (auto written = file->write(samples.data(), count); !written) {
       failure = Error{written.error().message + "; the recording ended after " +
-                      fixed(static_cast<double>(frames) / rate_hz, 2) + " s, which are kept"};
+                      fixed(static_cast<double>(frames) / rate_hz, 2) + " s, which are saved"};
       return;
     }
     frames += count;
@@ -135,7 +135,7 @@ bool Recorder::is_running() const {
 Result<Done> Recorder::start(const std::string& path, Existing existing) {
   Work& work = *work_;
   if (is_running()) {
-    return Error{"a recording to '" + work.path + "' is going on"};
+    return Error{"a recording to '" + work.path + "' is running"};
   }
   static_cast<void>(stop());  // one that ended by itself
   const double rate_now = work.process.clock.read().rate_hz;

@@ -100,12 +100,12 @@ Result<SoundReader> SoundReader::open(const std::string& path) {
     return Error{"there is no file '" + path + "'"};
   }
   if (!fs::is_regular_file(status)) {
-    return Error{"'" + path + "' is no ordinary file; a sound is read from one"};
+    return Error{"'" + path + "' is not a regular file"};
   }
   auto file = std::make_unique<File>();
   file->handle = sf_open(path.c_str(), SFM_READ, &file->info);
   if (file->handle == nullptr) {
-    return Error{"'" + path + "' is no sound file that can be read: " + sf_strerror(nullptr)};
+    return Error{"'" + path + "' is not a readable sound file: " + sf_strerror(nullptr)};
   }
   return SoundReader(std::move(file));
 }
@@ -191,7 +191,7 @@ struct SoundWriter::File {
   Result<Done> write(const T* samples, std::size_t frames, Write&& put) {
     bytes += frame_bytes * static_cast<double>(frames);
     if (kind.ends_at_4_gb && bytes > most_bytes) {
-      return Error{"'" + path + "' is full: a " + std::string(kind.ending) + " ends at 4 GB"};
+      return Error{"'" + path + "' is full: a " + std::string(kind.ending) + " is limited to 4 GB"};
     }
     const auto count = static_cast<sf_count_t>(frames);
     if (put(handle, samples, count) != count || tape.error != 0) {
@@ -217,19 +217,19 @@ Result<SoundWriter> SoundWriter::open(const std::string& path, const SoundForm& 
   const fs::file_status status = fs::status(path, error);
   const bool is_device = fs::is_character_file(status);
   if (fs::is_fifo(status) || fs::is_socket(status)) {
-    return Error{"'" + path + "' is a pipe; a sound file is gone back to when it is complete"};
+    return Error{"'" + path + "' is a pipe, but a sound file must be seekable"};
   }
   const Kind* const kind = is_device ? kinds : kind_of(path);
   if (kind == nullptr) {
     std::vector<std::string> known(sound_endings().begin(), sound_endings().end());
-    return Error{"'" + path +
-                 "' is the name of no sound file; these are written: " + joined(known, ", ")};
+    return Error{"'" + path + "' has no known sound file ending; use one of " +
+                 joined(known, ", ")};
   }
   const bool is_ogg = kind->form == SF_FORMAT_OGG;
   if (form.samples && (is_ogg || (!kind->holds_floats && form.samples != SampleFormat::pcm24))) {
     return Error{"'" + path + "': a " + std::string(kind->ending) + " holds " +
-                 (is_ogg ? "no such samples, it loses some of each" : "pcm24, no floats") +
-                 "; .wav, .w64, .aiff, .au and .caf do"};
+                 (is_ogg ? "compressed samples only" : "pcm24, but no floats") +
+                 "; use .wav, .w64, .aiff, .au or .caf"};
   }
   const SampleFormat samples =
       kind->holds_floats ? form.samples.value_or(form.preferred) : SampleFormat::pcm24;
@@ -239,10 +239,10 @@ Result<SoundWriter> SoundWriter::open(const std::string& path, const SoundForm& 
   const bool fits = form.frames && frame_bytes * static_cast<double>(*form.frames) <= most_bytes;
   if (kind->ends_at_4_gb && form.frames && !fits) {
     return Error{"'" + path + "': a " + std::string(kind->ending) +
-                 " ends at 4 GB; a .wav, .w64, .flac or .caf does not"};
+                 " is limited to 4 GB; use .wav, .w64, .flac or .caf"};
   }
   if (fs::is_regular_file(status) && existing == Existing::replace && !may_be_replaced(path)) {
-    return Error{"'" + path + "' is no sound: it is not written over"};
+    return Error{"'" + path + "' is not a sound file, so it is not overwritten"};
   }
   auto place = NewFile::open(path, existing, form.is_shown);
   if (!place) {

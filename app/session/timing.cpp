@@ -99,7 +99,7 @@ std::string too_much(const Plan& plan, int voices, double rate_hz, Precision pre
          (fitting > 0  ? ": " + std::to_string(fitting) + " fit"
           : voices > 1 ? ", one alone " + percent(each)
                        : "") +
-         "; what makes room: " + ways_to_make_room(fitting, precision);
+         "; to lower the load, use " + ways_to_make_room(fitting, precision);
 }
 
 std::string ways_to_make_room(int voices, Precision precision) {

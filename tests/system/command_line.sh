@@ -53,7 +53,7 @@ expect 2 "at most 32 MiB" "$program" check large.mdl
 expect 2 "there is no file 'nosuch.wav'" "$program" body nosuch.wav
 expect 2 'found a zero byte' "$program" body binary.mdl
 model text.wav 'no sound at all'
-expect 2 "'text.wav' is no sound file that can be read" "$program" body text.wav
+expect 2 "'text.wav' is not a readable sound file" "$program" body text.wav
 printf '0 /note/on 60 100\n' > blow.txt
 expect 0 "blow.flac" "$program" render Marimba --score blow.txt -s 2 -o blow.flac
 expect 0 "@blow body 40 hit left right" "$program" body blow.flac
@@ -64,18 +64,18 @@ expect 0 "stable" "$program" check rings.mdl
 expect 0 '"frequency_deviation_hz"' "$program" body blow.flac --json
 expect 0 "rings.mdl: 1 mode at 26" "$program" body blow.flac --modes 1 -o rings.mdl --force
 expect 2 "rings.mdl" "$program" body blow.flac -o rings.mdl
-expect 2 "'blow.flac' is read: it cannot be written too" "$program" body blow.flac -o blow.flac
+expect 2 "'blow.flac' is read: it cannot be the output" "$program" body blow.flac -o blow.flac
 expect 2 "ends in .svg" "$program" body blow.flac --picture rings.png
 expect 0 "rings.wav" "$program" render Marimba -s 0 -o rings.wav
 expect 2 "'rings.wav': " "$program" body rings.wav
 
 # Descriptions.
 expect 0 ", the centroid of the spectrum" "$program" describe blow.flac -o timbre.svg
-expect 2 "timbre.svg' is there already" "$program" describe blow.flac -o timbre.svg
+expect 2 "timbre.svg' exists already" "$program" describe blow.flac -o timbre.svg
 expect 2 "ends in .svg" "$program" describe blow.flac -o timbre.png
 expect 2 "there is no file 'nosuch.wav'" "$program" describe nosuch.wav
 expect 2 "there is no model or preset 'nosuch'" "$program" describe nosuch
-expect 2 "is no sound file that can be read" "$program" describe text.wav
+expect 2 "is not a readable sound file" "$program" describe text.wav
 expect 2 "must be one of hann, hamming, blackman, none" "$program" describe blow.flac --window flat
 expect 2 "must be a whole number, 4 to 65536" "$program" describe blow.flac --frame 2048.5
 expect 2 "at 999999 is not within the sound" "$program" describe blow.flac --at 999999
@@ -91,7 +91,7 @@ expect 0 "modes, in closed form" "$program" describe bar.mdl
 model free.mdl '@k param 0.1\n@z param 0.001\n@s string 20 1. k z 0. 0.\n@in1 frcInput [@s 0.3]\n@out1 posOutput [@s 0.7]\n'
 expect 0 "0.00 JND" "$program" shape free.mdl --f0 300 --t60 3 -o shaped.toml
 expect 0 "300.000" "$program" modes shaped.toml --modes 1
-expect 2 "shaped.toml' is there already" "$program" shape free.mdl --f0 300 -o shaped.toml
+expect 2 "shaped.toml' exists already" "$program" shape free.mdl --f0 300 -o shaped.toml
 expect 0 "as high as it gets is" "$program" shape free.mdl --f0 20000
 expect 0 '"attack_ms"' "$program" shape free.mdl --attack 8 --json
 expect 2 "must be a number above 0" "$program" shape free.mdl --attack 0
@@ -99,13 +99,13 @@ expect 0 '"k": "highest"' "$program" shape free.mdl --f0 20000 --json
 expect 0 "key 60 (C4 +0)" "$program" shape PolyTriangle --note 60 --centroid 400 --json
 expect 0 "as dark as it gets with the rest is" "$program" shape free.mdl --like blow.flac --t60 3
 expect 2 "keys set the pitch of PolyTriangle" "$program" shape PolyTriangle --f0 100
-expect 2 "bar.mdl:1:1: error: nothing may be turned" "$program" shape bar.mdl --t60 3
+expect 2 "bar.mdl:1:1: error: there is no parameter to adjust" "$program" shape bar.mdl --t60 3
 expect 2 "here is a bow" "$program" shape BowedString --t60 3
 expect 2 "did you mean 'centroid'?" "$program" shape free.mdl --centroit 300
 expect 2 "must be a number above 0, found nan" "$program" shape free.mdl --t60 nan
 expect 2 "no target; pass a figure" "$program" shape free.mdl
 expect 2 "ends in .toml" "$program" shape free.mdl --t60 3 -o shaped.wav
-expect 2 "it cannot be written too" "$program" shape shaped.toml --t60 3 -o shaped.toml --force
+expect 2 "it cannot be the output" "$program" shape shaped.toml --t60 3 -o shaped.toml --force
 expect 2 "there is no file 'nosuch.wav'" "$program" shape free.mdl --like nosuch.wav
 # The JSON is one object with plain numbers at the top level.
 if command -v python3 > /dev/null; then
@@ -200,7 +200,7 @@ model stiff.mdl '@K param 1.5\n@g ground 0.\n@m osc 1. K 0. 1. 1.\n@out1 posOutp
 expect 0 "stable; every stiffness may be multiplied by up to 2.66666" "$program" check stiff.mdl
 expect 0 "K            1.5        from 0 to 3.99999; stable below 4" "$program" check stiff.mdl
 model wild.mdl '@s ground 0.\n@m mass 1. 1. 1.\n@r spring @s @m 5.\n@out1 posOutput @m\n'
-expect 2 "wild.mdl:3:1: error: unstable: the stiffness 5 of 'r' must stay below 4; play, render and load take --force" \
+expect 2 "wild.mdl:3:1: error: unstable: the stiffness 5 of 'r' must stay below 4; pass --force to play it anyway" \
   "$program" check wild.mdl
 expect 2 '"verdict": "unstable"' "$program" check wild.mdl --json
 model wild-in.mdl '@s ground 0.\n@m mass 1. 0. 0.\n@r spring @s @m 5.\n@in1 frcInput @m\n@out1 posOutput @m\n'
@@ -236,7 +236,7 @@ expect 2 "name.mdl:2:21: error: no mass is called '@m1'" "$program" check two.to
   printf 'a = 1\n'; } > deep.toml
 expect 2 "deep.toml:2:18: error: this is nested more than 8 deep" "$program" check deep.toml
 head -c 65537 /dev/zero > big.toml
-expect 2 "at most 64 KiB are read" "$program" check big.toml
+expect 2 "the limit is 64 KiB" "$program" check big.toml
 
 # Exporting.
 expect 2 "--to" "$program" export PolyTriangle
@@ -264,8 +264,8 @@ model infinite.mdl '@g ground 0.\n@m mass 1. 0. 0.\n@r spring @g @m [0/0]\n'
 model late.score '1e300 /note/on 60\n'
 expect 2 "where a time in seconds was expected, at most a day" \
   "$program" render PolyTriangle -o out.wav --score late.score
-expect 2 "cannot be written too" "$program" render PolyTriangle -o bad.score --score bad.score
-expect 2 "word.mdl' is the name of no sound file; these are written: .wav, .w64, .flac, .ogg" \
+expect 2 "cannot be the output" "$program" render PolyTriangle -o bad.score --score bad.score
+expect 2 "word.mdl' has no known sound file ending; use one of .wav, .w64, .flac, .ogg" \
   "$program" render PolyTriangle -o word.mdl
 expect 2 "must be -120 to 60, found nan" "$program" play -g nan
 expect 2 "not a finite number" "$program" check infinite.mdl
@@ -286,7 +286,7 @@ expect 2 "wide.score' is text in UTF-16" "$program" render PolyTriangle -o out.w
 expect 0 "the number of cores of this machine" \
   "$program" render PolyTriangle -o out.wav --seconds 0.1 --threads 1024
 mkfifo pipe
-expect 2 "pipe' is no ordinary file" "$program" render PolyTriangle -o out.wav --input pipe
+expect 2 "pipe' is not a regular file" "$program" render PolyTriangle -o out.wav --input pipe
 
 # Files: input files and existing files are never lost, under any name.
 fail() {
@@ -304,16 +304,16 @@ for file in own.mdl own.toml own.score in.wav; do
   ln "$file" "hard-$file.wav"
   for name in "soft-$file.wav" "hard-$file.wav" "./hard-$file.wav" "sub/../hard-$file.wav" \
     "$folder/hard-$file.wav"; do
-    expect 2 "cannot be written too" \
+    expect 2 "cannot be the output" \
       "$program" render own.toml -o "$name" --input in.wav --score own.score
     expect 2 "" "$program" export "$file" --to faust -o "$name" --force
   done
 done
 for name in in.wav ./in.wav sub/../in.wav "$folder/in.wav"; do
-  expect 2 "cannot be written too" "$program" render own.mdl -o "$name" --input in.wav
+  expect 2 "cannot be the output" "$program" render own.mdl -o "$name" --input in.wav
 done
-expect 2 "cannot be written too" "$program" export own.mdl --to faust -o hard-own.mdl.wav --force
-expect 2 "is no sound: it is not written over" "$program" render own.mdl -o hard-own.score.wav
+expect 2 "cannot be the output" "$program" export own.mdl --to faust -o hard-own.mdl.wav --force
+expect 2 "is not a sound file, so it is not overwritten" "$program" render own.mdl -o hard-own.score.wav
 for file in own.mdl own.toml own.score in.wav; do
   cmp -s "$file" "before/$file" || fail "$file was written over"
 done
@@ -323,7 +323,7 @@ cmp -s in.wav again.wav || fail "a sound that was there is not written over"
 for command in "make string 5" "export own.mdl --to faust"; do
   printf 'mine' > there.txt
   # shellcheck disable=SC2086
-  expect 2 "there.txt' is there already; --force" "$program" $command -o there.txt
+  expect 2 "there.txt' exists already; --force" "$program" $command -o there.txt
   [ "$(cat there.txt)" = mine ] || fail "$command wrote over a file unasked"
   # shellcheck disable=SC2086
   expect 0 "" "$program" $command -o there.txt --force
@@ -335,17 +335,17 @@ for ending in wav w64 flac ogg aiff aif au caf WAV; do
   expect 0 "peak" "$program" render own.mdl -o "all.$ending" --score own.score --seconds 0.5
   expect 0 "0.50 s" "$program" render own.mdl -o out.wav --input "all.$ending" --seconds 0.5
 done
-expect 2 "is the name of no sound file" "$program" render own.mdl -o all.mp4
+expect 2 "has no known sound file ending" "$program" render own.mdl -o all.mp4
 expect 2 "pipe' is a pipe" "$program" render own.mdl -o pipe
-expect 2 "a .flac holds pcm24, no floats" "$program" render own.mdl -o all.flac --format double
-expect 2 "a .ogg holds no such samples" "$program" render own.mdl -o all.ogg --format pcm24
-expect 2 "a .au ends at 4 GB" "$program" render own.mdl -o big.au --seconds 86400
+expect 2 "a .flac holds pcm24, but no floats" "$program" render own.mdl -o all.flac --format double
+expect 2 "a .ogg holds compressed samples only" "$program" render own.mdl -o all.ogg --format pcm24
+expect 2 "a .au is limited to 4 GB" "$program" render own.mdl -o big.au --seconds 86400
 
 # Full disks.
 expect_full() {
   said=$(timeout 60 "$@" 2>&1 > /dev/full < /dev/null)
   got=$?
-  [ "$got" = 1 ] && printf '%s' "$said" | grep -q "could not be written whole" ||
+  [ "$got" = 1 ] && printf '%s' "$said" | grep -q "the output is incomplete" ||
     fail "$* to a full disk ended with $got, saying: $said"
 }
 expect_full "$program" check own.mdl
@@ -392,7 +392,7 @@ rm -f killed.part.wav
 [ -z "$(find . -name '*.part*')" ] || fail "left behind: $(find . -name '*.part*')"
 
 # The stability check.
-expect 2 "wild.mdl:3:1: error: unstable: the stiffness 5 of 'r' must stay below 4; play, render and load take --force" \
+expect 2 "wild.mdl:3:1: error: unstable: the stiffness 5 of 'r' must stay below 4; pass --force to play it anyway" \
   "$program" render wild.mdl -o wild.wav --seconds 1
 expect 0 "became unstable" "$program" render wild.mdl -o wild.wav --seconds 1 --force
 expect 0 "wild.mdl:3:1: warning: unstable: the stiffness 5 of 'r'" \
@@ -460,7 +460,7 @@ expect 2 "must be a number" "$program" render PolyTriangle -o out.wav --score pu
 
 # Playing without audio devices.
 expect 75 "no JACK server answers to the name 'ressort-nobody'" "$program" play -a jack -i
-expect 75 "does not open" "$program" play -a alsa -d nosuchdevice -i
+expect 75 "cannot open the ALSA device" "$program" play -a alsa -d nosuchdevice -i
 expect 2 "there is no model or preset 'nosuch'" "$program" play nosuch -a dummy -i
 
 # Long loads. A signal ends them at any point, with the usual exit status.
@@ -493,13 +493,13 @@ model huge.mdl '@s string 3900000 1. 0.1 0. 0. 0.\n@out1 posOutput [@s 0.3]\n'
 said=$(ulimit -v 700000; printf 'load huge\nparams\nquit\n' | timeout 60 "$program" $play 2>&1)
 got=$?
 case $got:$said in
-  0:*"'huge' could not be loaded: there is not enough memory"*m_K*) ;;
+  0:*"'huge' could not be loaded: not enough memory"*m_K*) ;;
   *)
     echo "FAILED: a load without memory ended with $got, saying: $said"
     failures=$((failures + 1))
     ;;
 esac
-expect 2 "there is not enough memory" sh -c "ulimit -v 700000; $program check huge.mdl"
+expect 2 "not enough memory" sh -c "ulimit -v 700000; $program check huge.mdl"
 
 "$program" play PolyTriangle -a dummy -m none -i -u 19783 > first.log 2>&1 &
 first=$!

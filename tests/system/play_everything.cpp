@@ -170,7 +170,7 @@ class Harness {
   bool load(const std::string& path) {
     is_forced_ = false;
     std::string refusal = try_to_load(path, false);
-    if (refusal.find("take --force") != refusal.npos) {
+    if (refusal.find("pass --force") != refusal.npos) {
       is_forced_ = true;
       refusal = try_to_load(path, true);
     }

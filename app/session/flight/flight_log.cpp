@@ -79,7 +79,7 @@ void FlightLog::add(FlightEngine engine, bool has_audio_inputs) {
   }
   flight_.has_audio_inputs = flight_.has_audio_inputs || has_audio_inputs;
   if (text_bytes_ > most_text_bytes) {
-    lost_ = "the models that were loaded have more text than a flight keeps";
+    lost_ = "the texts of the loaded models are too long for a flight";
   } else if (flight_.engines.size() >= most_engines) {
     lost_ = "models have been loaded more than " + std::to_string(most_engines) + " times";
   }
@@ -95,7 +95,7 @@ void FlightLog::drain(Process& process) {
   FlightRecord record;
   for (std::size_t left = process.flight.size(); left > 0 && process.flight.pop(record); --left) {
     if (record.kind == FlightRecord::Kind::gap) {
-      lost_ = "a load took so long that events were lost meanwhile";
+      lost_ = "events were lost during a long load";
     } else if (records_.size() >= most_records) {
       lost_ = "more than " + std::to_string(most_records) + " events have been played";
     }
@@ -125,10 +125,10 @@ bool FlightLog::has_begun() const {
 
 Result<Flight> FlightLog::flight() const {
   if (!lost_.empty()) {
-    return Error{lost_ + "; the next flight begins when ressort is started anew"};
+    return Error{lost_ + "; restart ressort to begin a new flight"};
   }
   if (!has_begun()) {
-    return Error{"nothing has sounded yet"};
+    return Error{"nothing has been played yet"};
   }
   Flight now = flight_;
   now.made_by = std::string(version) + " " + commit;

@@ -181,7 +181,7 @@ class FlightReader {
 
   Result<Flight> read() {
     if (next() != first_line) {
-      return Error{"expected '" + std::string(first_line) + "', as a flight begins", 1, 1};
+      return Error{"expected '" + std::string(first_line) + "' at the start of a flight", 1, 1};
     }
     while (!rest_.empty()) {
       const std::string_view line = next();
@@ -190,12 +190,12 @@ class FlightReader {
       if (!(is_record ? read_record(words) : read_line(words)) || !words.ok) {
         return Error{!advice_.empty()
                          ? advice_
-                         : "no line of a flight: '" + std::string(line.substr(0, 80)) + "'",
+                         : "invalid line in a flight: '" + std::string(line.substr(0, 80)) + "'",
                      line_, 1};
       }
     }
     if (flight_.engines.empty() || flight_.records.empty()) {
-      return Error{"the flight has ended before it began; expected engines and events", line_, 1};
+      return Error{"the flight has no engines or no events", line_, 1};
     }
     return std::move(flight_);
   }

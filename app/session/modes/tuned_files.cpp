@@ -22,13 +22,14 @@ fs::path folder_of_tuned() {
 Result<TunedFiles> tuned_files(const std::string& name, const std::string& model_text) {
   const fs::path folder = folder_of_tuned();
   if (folder.empty()) {
-    return Error{"there is no folder for what is tuned: neither XDG_CACHE_HOME nor HOME is set"};
+    return Error{
+        "there is no cache folder for tuned models: neither XDG_CACHE_HOME nor HOME is set"};
   }
   const fs::path place = folder / digest(model_text);
   std::error_code error;
   fs::create_directories(place, error);
   if (error) {
-    return Error{"the folder '" + place.string() + "' cannot be made: " + error.message()};
+    return Error{"cannot create the folder '" + place.string() + "': " + error.message()};
   }
   return TunedFiles{(place / (name + ".mdl")).string(), (place / (name + ".toml")).string()};
 }
@@ -52,8 +53,8 @@ Result<std::string> keep_tuned(const std::string& model, const std::string& name
   fs::create_directories(folder, error);
   const std::string path = (folder / (name + ".mdl")).string();
   if (existing == Existing::refuse && fs::exists(path, error)) {
-    return Error{"'" + path + "' is there already; 'save " + name +
-                 " --force' at the console writes over it"};
+    return Error{"'" + path + "' exists already; type 'save " + name +
+                 " --force' at the console to overwrite it"};
   }
   const auto written = write_text(path, *text, existing);
   return written ? Result<std::string>(path) : written.error();

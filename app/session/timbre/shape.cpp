@@ -55,15 +55,15 @@ Error nothing_to_turn(const Scene& scene) {
   const Network& network = scene.network;
   if (!network.parameters.empty()) {
     return {
-        "nothing may be turned: each parameter is an input's, or its range has one value; give "
-        "one a wider range in the preset's [parameters]"};
+        "there is no parameter to adjust: each one belongs to an input or has only one value; "
+        "give one a wider range in the preset's [parameters]"};
   }
   const std::string how =
-      " is a fixed number: put '@K param VALUE' above this line and K in its "
+      " is a fixed number; put '@K param VALUE' above this line and K in its "
       "place";
   const auto lines = spring_lines(network);
   if (!lines || lines->empty()) {
-    return {"nothing may be turned: the model has no 'param'"};
+    return {"there is no parameter to adjust: the model has no 'param'"};
   }
   const SpringLine& line = lines->front();
   const SourceLocation place =
@@ -71,14 +71,13 @@ Error nothing_to_turn(const Scene& scene) {
       : line.kind == SpringLine::Kind::link ? network.links[line.index].location
                                             : network.masses[line.index].location;
   const Finding finding = finding_in_model(
-      scene, {"nothing may be turned: the stiffness here" + how, place.line, place.column});
+      scene,
+      {"there is no parameter to adjust: the stiffness here" + how, place.line, place.column});
   return {to_string(finding)};
 }
 
 std::optional<Error> not_linear(const Scene& scene) {
-  const std::string so =
-      ", so how it sounds depends on how it is played: no figure can be asked "
-      "for";
+  const std::string so = ", so its timbre depends on how it is played and cannot be adjusted";
   if (has_waveguide(scene.network)) {
     return Error{scene.name + " has a waveguide, which has no modes of this kind" + so};
   }
@@ -168,16 +167,15 @@ Result<Shaped> shape_timbre(const ShapeRequest& request, std::vector<TimbreTarge
   }
   if (scene.network.inputs.empty() || scene.network.outputs.empty()) {
     return Error{scene.name + " has no " +
-                 (scene.network.inputs.empty() ? "input that could be struck"
-                                               : "output that could be heard")};
+                 (scene.network.inputs.empty() ? "input to strike" : "output to listen to")};
   }
   for (std::size_t i = 0; i < targets.size(); ++i) {
     const auto same = [&](const TimbreTarget& other) { return other.figure == targets[i].figure; };
     if (std::count_if(targets.begin(), targets.end(), same) > 1) {
-      return Error{short_name(targets[i].figure) + " is asked for twice"};
+      return Error{short_name(targets[i].figure) + " is given twice"};
     }
     if (request.has_keys && targets[i].figure == AskedFigure::f0) {
-      return Error{"keys set the pitch of " + scene.name + "; ask for another key instead"};
+      return Error{"keys set the pitch of " + scene.name + "; use another key instead"};
     }
   }
   std::vector<FreeParameter> free;
@@ -242,11 +240,11 @@ std::vector<std::string> missed(const Shaped& shaped) {
     held.push_back(shaped.names[bound.index] + " is at its " +
                    (bound.is_highest ? "highest" : "lowest"));
   }
-  const std::string why = !shaped.found.has_influence ? "nothing that may be turned changes it"
-                          : held.empty()              ? shaped.targets.size() > 1
-                                                            ? "more of one is less of another"
-                                                            : "what may be turned leads no further"
-                                                      : joined(held, ", ");
+  const std::string why =
+      !shaped.found.has_influence ? "no parameter changes it"
+      : held.empty()
+          ? shaped.targets.size() > 1 ? "the targets conflict" : "the parameters reach no further"
+          : joined(held, ", ");
   std::vector<std::string> lines;
   for (std::size_t t = 0; t < shaped.targets.size(); ++t) {
     const double noticed = shaped.found.noticed[t];

@@ -94,7 +94,7 @@ TEST_CASE("unstable models load only with --force, and parameters stay in the st
   CHECK(has(harness.say("status"), "limits  0 times"));
   const std::string refused = harness.say("load " + wild);
   CHECK(has(refused, "was not loaded\n" + wild + ":3:1: error: unstable: the stiffness 5 of 'r'"));
-  CHECK(has(refused, "below 4.73876, at 48000 Hz; play, render and load take --force"));
+  CHECK(has(refused, "below 4.73876, at 48000 Hz; pass --force to play it anyway"));
   CHECK(harness.session.current()->name == "wide");
   CHECK(has(harness.say("load " + wild + " --force"), "warning: unstable: the stiffness 5 of 'r'"));
   CHECK(harness.session.current()->name == "wild");

@@ -398,13 +398,13 @@ TEST_CASE("packets load only files below the program's folders", "[osc_access]")
                                   std::string("."),
                                   std::string("..")}) {
     INFO(name);
-    CHECK(contains(harness.load_by_osc(name), "OSC loads no others"));
+    CHECK(contains(harness.load_by_osc(name), "OSC cannot load"));
   }
   for (const char* const name : {"up", "absolute", "linked"}) {
     INFO(name);
     CHECK(harness.load_by_osc(name) ==
-          name + std::string(".toml:1:9: error: its model is none of the "
-                             "program's own, and OSC loads no others"));
+          name + std::string(".toml:1:9: error: its model is outside the "
+                             "program's folders, so OSC cannot load it"));
     CHECK(harness.session.load_and_wait(presets /
                                         (name + std::string(".toml"))));  // A local user may.
   }

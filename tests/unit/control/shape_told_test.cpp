@@ -116,7 +116,7 @@ TEST_CASE("the console rejects invalid targets", "[shape_told]") {
   CHECK(has(h.say("shape t60 3 f0"), "expected FIGURE VALUE"));
   CHECK(has(h.say("shape 3 t60"), "expected a figure's name"));
   CHECK(has(h.say("shape centroit 3"), "did you mean 'centroid'?"));
-  CHECK(has(h.say("shape t60 3 t60 4"), "t60 is asked for twice"));
+  CHECK(has(h.say("shape t60 3 t60 4"), "t60 is given twice"));
   for (const char* const wrong : {"0", "-1"}) {
     CHECK(has(h.say(std::string("shape t60 ") + wrong), "must be a number above 0"));
   }

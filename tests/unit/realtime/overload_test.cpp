@@ -313,14 +313,17 @@ TEST_CASE("a plan that one core has no time for says how many voices fit", "[ove
     return made;
   };
   CHECK(too_much(plan(1.75), 64, 48000.0, Precision::float64) ==
-        "all 64 voices would take about 175 % of one core: 32 fit; what makes room: -p 32, a lower "
+        "all 64 voices would take about 175 % of one core: 32 fit; to lower the load, use -p 32, a "
+        "lower "
         "rate, --precision float");
   CHECK(too_much(plan(1.75), 64, 48000.0, Precision::float32) ==
-        "all 64 voices would take about 175 % of one core: 32 fit; what makes room: -p 32, a lower "
+        "all 64 voices would take about 175 % of one core: 32 fit; to lower the load, use -p 32, a "
+        "lower "
         "rate");
-  CHECK(too_much(plan(2.4), 1, 48000.0, Precision::float64) ==
-        "its one voice would take about 240 % of one core; what makes room: a smaller model, a "
-        "lower rate, --precision float");
+  CHECK(
+      too_much(plan(2.4), 1, 48000.0, Precision::float64) ==
+      "its one voice would take about 240 % of one core; to lower the load, use a smaller model, a "
+      "lower rate, --precision float");
   CHECK(too_much(plan(2.4), 2, 48000.0, Precision::float32) ==
         "all 2 voices would take about 240 % of one core, one alone about 120 % of one core; what "
         "makes room: a smaller model, a lower rate");
@@ -350,7 +353,7 @@ TEST_CASE("a session warns of a plan that is too much, and tells of an overload"
     REQUIRE(loaded);
     REQUIRE((*loaded)->warnings.size() == 1);
     CHECK((*loaded)->warnings[0].find("all 256 voices would take about ") == 0);
-    CHECK((*loaded)->warnings[0].find(" fit; what makes room: -p ") != std::string::npos);
+    CHECK((*loaded)->warnings[0].find(" fit; to lower the load, use -p ") != std::string::npos);
 
     CHECK(session.status().cpu == -1.0);  // nothing runs
     Meters meters;
@@ -382,10 +385,10 @@ TEST_CASE("a session warns of a plan that is too much, and tells of an overload"
     }
   }
   std::filesystem::remove_all(folder);
-  CHECK(told ==
-        "the sound takes 140 % of the time there is; the quietest voices fade out, and 3 sound at "
-        "once until there is time again; what makes room: a longer period, -p 3, a lower rate, "
-        "--precision float\n");
+  CHECK(
+      told ==
+      "the load is 140 %; the quietest voices fade out, and at most 3 voices sound until the load "
+      "falls; to lower the load, use a longer period, -p 3, a lower rate, --precision float\n");
 }
 
 }  // namespace ressort::overload_test

@@ -97,7 +97,7 @@ TEST_CASE("a file that is there is not written over unasked", "[files]") {
   const Folder folder;
   const std::string path = folder.write("a.txt", "old");
   CHECK(has(error_of(write_text(path, "new", Existing::refuse)),
-            "a.txt' is there already; --force writes over it"));
+            "a.txt' exists already; --force overwrites it"));
   CHECK(folder.text("a.txt") == "old");
   auto file = NewFile::open(folder.file("b.txt"), Existing::refuse);
   REQUIRE(file);
@@ -128,7 +128,7 @@ TEST_CASE("what is read is known under every name", "[files]") {
   fs::create_directory(folder.file("sub"));
   for (const char* name : {"in.wav", "./in.wav", "sub/../in.wav", "soft.wav", "hard.wav"}) {
     INFO(name);
-    CHECK(has(error_of(spare(folder.file(name), read)), "cannot be written too"));
+    CHECK(has(error_of(spare(folder.file(name), read)), "cannot be the output"));
   }
   CHECK(spare(folder.file("out.wav"), read));
   CHECK(spare(folder.write("same_text.wav", "x"), read));
@@ -201,11 +201,11 @@ TEST_CASE("what a sound file cannot be is refused", "[files]") {
   };
   for (const char* name : {"a.mp4", "a", "a.mdl", ".wav"}) {
     INFO(name);
-    CHECK(has(refusal(name, {}), "the name of no sound file; these are written: .wav, .w64"));
+    CHECK(has(refusal(name, {}), "no known sound file ending; use one of .wav, .w64"));
   }
-  CHECK(has(refusal("a.flac", {.samples = SampleFormat::float32}), "holds pcm24, no floats"));
-  CHECK(has(refusal("a.ogg", {.samples = SampleFormat::pcm24}), "holds no such samples"));
-  CHECK(has(refusal("a.aiff", {.frames = 1LL << 30}), "ends at 4 GB"));
+  CHECK(has(refusal("a.flac", {.samples = SampleFormat::float32}), "holds pcm24, but no floats"));
+  CHECK(has(refusal("a.ogg", {.samples = SampleFormat::pcm24}), "holds compressed samples only"));
+  CHECK(has(refusal("a.aiff", {.frames = 1LL << 30}), "is limited to 4 GB"));
   CHECK(folder.names().empty());
 }
 
@@ -215,7 +215,7 @@ TEST_CASE("a sound is written over sounds and nothing else", "[files]") {
     return SoundWriter::open(folder.file(name), {}, Existing::replace);
   };
   folder.write("poem.wav", "it is no sound");
-  CHECK(has(error_of(open("poem.wav")), "is no sound: it is not written over"));
+  CHECK(has(error_of(open("poem.wav")), "is not a sound file, so it is not overwritten"));
   CHECK(folder.text("poem.wav") == "it is no sound");
   folder.write("empty.wav", "");
   CHECK(open("empty.wav"));
@@ -316,10 +316,11 @@ TEST_CASE("what is killed is a sound as long as it was a second before", "[files
 TEST_CASE("a sound is read from an ordinary file", "[files]") {
   const Folder folder;
   REQUIRE(mkfifo(folder.file("pipe.wav").c_str(), 0600) == 0);
-  CHECK(has(error_of(SoundReader::open(folder.file("pipe.wav"))), "is no ordinary file"));
+  CHECK(has(error_of(SoundReader::open(folder.file("pipe.wav"))), "is not a regular file"));
   CHECK(has(error_of(SoundReader::open(folder.file("none.wav"))), "there is no file"));
-  CHECK(has(error_of(SoundReader::open(folder.file(""))), "is no ordinary file"));
-  CHECK(has(error_of(SoundReader::open(folder.write("text.wav", "no sound"))), "is no sound file"));
+  CHECK(has(error_of(SoundReader::open(folder.file(""))), "is not a regular file"));
+  CHECK(has(error_of(SoundReader::open(folder.write("text.wav", "no sound"))),
+            "is not a readable sound file"));
 }
 
 TEST_CASE("a preset reads several models as one, and says in which a mistake is", "[files]") {

@@ -282,20 +282,21 @@ TEST_CASE("What is no flight is refused with its line", "[flight]") {
     REQUIRE(!flight);
     return std::to_string(flight.error().line) + ": " + flight.error().message;
   };
-  CHECK(error_of("") == "1: expected 'ressort flight 1', as a flight begins");
-  CHECK(error_of("ressort flight 2\n") == "1: expected 'ressort flight 1', as a flight begins");
-  CHECK(error_of("ressort flight 1\nend 5\nspeed 3\n") == "3: no line of a flight: 'speed 3'");
-  CHECK(error_of("ressort flight 1\nend -5\n") == "2: no line of a flight: 'end -5'");
+  CHECK(error_of("") == "1: expected 'ressort flight 1' at the start of a flight");
+  CHECK(error_of("ressort flight 2\n") ==
+        "1: expected 'ressort flight 1' at the start of a flight");
+  CHECK(error_of("ressort flight 1\nend 5\nspeed 3\n") == "3: invalid line in a flight: 'speed 3'");
+  CHECK(error_of("ressort flight 1\nend -5\n") == "2: invalid line in a flight: 'end -5'");
   CHECK(error_of("ressort flight 1\ntexts\ntext 100 a.mdl\nshort\n") ==
-        "3: no line of a flight: 'text 100 a.mdl'");
-  CHECK(error_of("ressort flight 1\n0 period 0 2\n") == "2: no line of a flight: '0 period 0 2'");
+        "3: invalid line in a flight: 'text 100 a.mdl'");
+  CHECK(error_of("ressort flight 1\n0 period 0 2\n") ==
+        "2: invalid line in a flight: '0 period 0 2'");
   for (const std::string share : {"0 2", "3 2", "1 65", "1.5 2", "1", "1 2 3"}) {
     CHECK(error_of("ressort flight 1\nshare " + share + "\n") ==
-          "2: no line of a flight: 'share " + share + "'");
+          "2: invalid line in a flight: 'share " + share + "'");
   }
-  CHECK(error_of("ressort flight 1\n0 dance 1\n") == "2: no line of a flight: '0 dance 1'");
-  CHECK(error_of("ressort flight 1\nend 5\n") ==
-        "2: the flight has ended before it began; expected engines and events");
+  CHECK(error_of("ressort flight 1\n0 dance 1\n") == "2: invalid line in a flight: '0 dance 1'");
+  CHECK(error_of("ressort flight 1\nend 5\n") == "2: the flight has no engines or no events");
 }
 
 TEST_CASE("Nothing has flown before something sounds", "[flight]") {
@@ -304,7 +305,7 @@ TEST_CASE("Nothing has flown before something sounds", "[flight]") {
   const auto written =
       stage.session.write_flight((folder.path / "f.ressort").string(), Existing::refuse);
   REQUIRE(!written);
-  CHECK(written.error().message == "nothing has sounded yet");
+  CHECK(written.error().message == "nothing has been played yet");
 }
 
 TEST_CASE("Every preset flies", "[.][flights_everywhere]") {

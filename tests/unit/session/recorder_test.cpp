@@ -18,7 +18,7 @@ TEST_CASE("rec writes what is heard, frame by frame", "[recorder]") {
   harness.loudest(4);
   CHECK(harness.say("rec " + path) == "recording to " + path + "; 'rec stop' ends it\n");
   CHECK(has(harness.say("status"), "recording  yes"));
-  CHECK(has(harness.say("rec " + path), "error: a recording to '" + path + "' is going on"));
+  CHECK(has(harness.say("rec " + path), "error: a recording to '" + path + "' is running"));
   std::vector<double> heard;
   for (const std::size_t frames : {period, std::size_t{1}, std::size_t{100}, period}) {
     for (const float sample : harness.play(frames)) {
@@ -94,14 +94,15 @@ TEST_CASE("rec writes over a sound when it is told to, over other files never", 
   harness.say("rec " + path);
   harness.play(100);
   harness.say("rec stop");
-  CHECK(has(harness.say("rec " + path), "take.wav' is there already; --force writes over it"));
+  CHECK(has(harness.say("rec " + path), "take.wav' exists already; --force overwrites it"));
   CHECK(has(harness.say("rec " + path + " --force"), "recording to"));
   harness.play(50);
   CHECK(read_sound(path)->channels[0].size() == 100);  // until the new one is whole
   harness.say("rec stop");
   CHECK(read_sound(path)->channels[0].size() == 50);
-  CHECK(has(harness.say("rec " + folder.write("poem.wav", "text") + " --force"), "is no sound"));
-  CHECK(has(harness.say("rec " + folder.file("take.mp4")), "the name of no sound file"));
+  CHECK(has(harness.say("rec " + folder.write("poem.wav", "text") + " --force"),
+            "is not a sound file"));
+  CHECK(has(harness.say("rec " + folder.file("take.mp4")), "has no known sound file ending"));
 }
 
 TEST_CASE("rec writes what the ending says", "[recorder]") {

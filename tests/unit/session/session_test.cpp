@@ -324,9 +324,8 @@ TEST_CASE("What happens again and again is told once, with how often it was", "[
     }
     return times;
   };
-  const std::string late_news = "an event came 0.500 s after its time";
-  const std::string lost_news =
-      "an event found no room and was dropped: more came than can be played";
+  const std::string late_news = "an event came 0.500 s late";
+  const std::string lost_news = "an event was dropped, because more events came than can be played";
   for (int patience = 0; patience < 2000 && (count(late_news) < 738 || count(lost_news) < 4096);
        ++patience) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
