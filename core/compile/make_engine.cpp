@@ -55,8 +55,8 @@ std::optional<Error> check_memory(const Machine& machine, int voices, Precision 
     masses += program.moving;
   }
   return Error{std::to_string(voices) + (voices == 1 ? " voice" : " voices") + " of " +
-               std::to_string(masses) + " masses would take " + in_bytes(bytes_of(voices)) +
-               " of memory, and there are " + in_bytes(most_bytes) + "; " +
+               std::to_string(masses) + " masses need " + in_bytes(bytes_of(voices)) +
+               " of memory, but only " + in_bytes(most_bytes) + " are free; " +
                (fitting > 0 ? "lower the voices to " + std::to_string(fitting)
                             : std::string("use a smaller model"))};
 }

@@ -9,12 +9,12 @@
 namespace ressort::compile {
 namespace {
 
-// What may go wrong as published.
-std::string_view trouble(const LawFacts& law) {
-  return law.is_friction      ? "grip a sample too late"
-         : law.is_spring()    ? "blow up where it is the stiffest"
-         : law.is_one_sided() ? "gain energy at a touch"
-                              : "gain energy as it snaps";
+// Returns how the published law may fail.
+std::string_view hazard_of(const LawFacts& law) {
+  return law.is_friction      ? "stick one sample too late"
+         : law.is_spring()    ? "become unstable at large amplitudes"
+         : law.is_one_sided() ? "gain energy at each contact"
+                              : "gain energy on release";
 }
 
 std::string counted(const LawFacts& law, std::size_t count) {
@@ -83,7 +83,7 @@ Schemes choose_schemes(const Network& network, const Budget& budget, const Progr
     if (counts[i] > 0 && budget.passive == Passivity::always) {
       schemes.notes.push_back(who + " made passive: as published " +
                               (counts[i] == 1 ? "it could " : "they could ") +
-                              std::string(trouble(law)));
+                              std::string(hazard_of(law)));
     }
     all += counts[i] > 0 ? (all.empty() ? "" : ", ") + who : "";
   }

@@ -414,10 +414,10 @@ TEST_CASE("links without a stability proof are made passive, with a note", "[pas
   CHECK(found(usual) == std::vector{plain, passive, plain, passive, passive, passive});
   CHECK(usual.notes ==
         std::vector<std::string>{
-            "1 spring that bends made passive: as published it could blow up where it is "
-            "the stiffest",
-            "1 bow made passive: as published it could grip a sample too late",
-            "2 contacts made passive: as published they could gain energy at a touch"});
+            "1 spring that bends made passive: as published it could become unstable at large "
+            "amplitudes",
+            "1 bow made passive: as published it could stick one sample too late",
+            "2 contacts made passive: as published they could gain energy at each contact"});
   const Schemes never = choose_schemes(network, {.passive = Passivity::never});
   CHECK(found(never) == std::vector(6, plain));
   CHECK(never.notes.empty());

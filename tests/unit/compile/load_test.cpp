@@ -255,8 +255,9 @@ TEST_CASE("Voices that do not fit into memory are refused with the number that f
   REQUIRE_FALSE(refused);
   const std::string& text = refused.error().message;
   CAPTURE(text);
-  CHECK(text.find("64 voices of 8000 masses would take ") == 0);
-  CHECK(text.find(" MB of memory, and there are 5 MB; lower the voices to ") != std::string::npos);
+  CHECK(text.find("64 voices of 8000 masses need ") == 0);
+  CHECK(text.find(" MB of memory, but only 5 MB are free; lower the voices to ") !=
+        std::string::npos);
   const int fitting = std::stoi(text.substr(text.rfind(' ')));
   CHECK(fitting > 0);
   CHECK(compile_network(network, preset,

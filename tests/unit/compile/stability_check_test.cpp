@@ -101,8 +101,7 @@ TEST_CASE("An argument that is not finite is refused with its element, line and 
         "there.mdl:3:17: error: the place 1/P is not finite when P = 0");
   // At a lower rate the stiffness grows. The values of an audio input are unknown.
   CHECK(said_to(ground + "@r spring @g @m 1e308\n", {.rate_hz = 8000.0, .force = true}) ==
-        "there.mdl:3:1: error: the argument " + std::string("1e308") +
-            " of 'r' is not finite");
+        "there.mdl:3:1: error: the argument " + std::string("1e308") + " of 'r' is not finite");
   CHECK(compile_network(network_of("@K audioParam @in1\n@o osc 1 1/K 0 0 0\n"), {}, {}));
 }
 
