@@ -45,7 +45,7 @@ expect 2 "is a folder" "$program" check "$folder"
 expect 2 "empty.mdl:1:1: error: the model is empty" "$program" check empty.mdl
 head -c 3000 /dev/urandom > binary.mdl
 printf '\0' >> binary.mdl
-expect 2 "this is no text" "$program" check binary.mdl
+expect 2 "a binary file, not a model" "$program" check binary.mdl
 head -c 52428800 /dev/zero > large.mdl
 expect 2 "at most 32 MiB" "$program" check large.mdl
 

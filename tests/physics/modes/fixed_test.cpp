@@ -85,7 +85,7 @@ TEST_CASE("a label that the model does not have cannot be fixed", "[fixed]") {
   const std::vector<Error> found =
       find_preset_errors(network_of(guitar), preset_of("fixed = [\"bix\"]\n"));
   REQUIRE(found.size() == 1);
-  CHECK(found[0].message == "the model has nothing labelled 'bix' that keys could leave");
+  CHECK(found[0].message == "the model has no element 'bix' for 'fixed'");
 }
 
 }  // namespace ressort::fixed_test

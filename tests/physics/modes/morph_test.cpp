@@ -289,14 +289,13 @@ TEST_CASE("a morph that is not possible is rejected with advice", "[morph]") {
   const std::string plain = string("string 12 1. 0.1 0.001 0. 0.");
   CHECK(
       refused(plain, string("string 20 1. 0.1 0.001 0. 0.")) ==
-      "a morph needs models of the same structure, but 's' has 12 nodes and not the 20 that it "
-      "has in Other; put both into one model and turn the levels of its outputs, as SixStructures "
-      "does");
+      "a morph needs models of the same structure, but 's' has 12 nodes, not 20, as in Other; put "
+      "both into one model and change the levels of its outputs, as SixStructures does");
   CHECK(refused(plain, string("chain 12 1. 0.1 0.001 0. 0.")).find("is of another kind") !=
         std::string::npos);
   CHECK(refused(plain, plain + "@g ground 0.\n@k spring @g [@s 0.5] 0.1\n").find("masses") !=
         std::string::npos);
-  CHECK(refused(plain + "@out2 posOutput [@s 0.1]\n", plain).find("a morph goes between") == 0);
+  CHECK(refused(plain + "@out2 posOutput [@s 0.1]\n", plain).find("a morph needs models") == 0);
   const std::string spring =
       "@m mass 1. 0. 0.\n@g ground 0.\n@in1 frcInput @m\n@out1 posOutput @m\n";
   CHECK(refused(spring + "@l spring @g @m 0.1\n", spring + "@l nlSpring3 @g @m 0.1 0.1 0.\n")

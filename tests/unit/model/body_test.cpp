@@ -76,7 +76,7 @@ TEST_CASE("errors in bodies are reported", "[body]") {
   check_error("@b body 1. x\n@out1 posOutput [@b x]\n", 1, 1,
               "the body '@b' has no modes: each is a line like '@b_1 mode @b 440. 2. 1.'");
   check_error(bell + "@b3 mode @bell 800. 1. 0.5 0.5\n", 5, 28,
-              "the body '@bell' has 3 places (rim waist crown), so a mode has as many "
+              "the body '@bell' has 3 places (rim waist crown), so a mode needs as many "
               "displacements; found 2");
   check_error(bell + "@b3 mode @bell 0. 1. 1. 1. 1.\n", 5, 16,
               "a mode's frequency in Hz must be above 0, found '0.'");
@@ -95,9 +95,10 @@ TEST_CASE("errors in bodies are reported", "[body]") {
               8, 24, "found 'k' where a displacement, a number without parameters, was expected");
   check_error("@b body 1. x x\n@b1 mode @b 1. 1. 1. 1.\n@out1 posOutput [@b x]\n", 1, 14,
               "the body has two places called 'x'");
-  check_error("@b body 1. 2x\n@b1 mode @b 1. 1. 1.\n@out1 posOutput [@b 0]\n", 1, 12,
-              "'2x' is no name of a place: it has letters, digits and '_' only, and starts with "
-              "no digit");
+  check_error(
+      "@b body 1. 2x\n@b1 mode @b 1. 1. 1.\n@out1 posOutput [@b 0]\n", 1, 12,
+      "'2x' is not a name for a place: use letters, digits and '_', and do not start with a "
+      "digit");
 }
 
 TEST_CASE("printed bodies read back unchanged", "[body]") {

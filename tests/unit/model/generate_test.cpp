@@ -277,7 +277,7 @@ TEST_CASE("invalid shapes are rejected with a reason", "[generate]") {
            Wrong{{.kind = ShapeKind::mesh, .length = 5},
                  "this shape needs a size of at least 2 by 2"},
            Wrong{{.kind = ShapeKind::corner_mesh, .length = 2, .width = 2},
-                 "this shape of four corners has nothing that moves"},
+                 "this shape has only corners, which are fixed"},
            Wrong{{.kind = ShapeKind::triangle, .length = 2},
                  "all points of this shape are fixed: choose a larger size"},
            Wrong{{.kind = ShapeKind::hexagon}, "this shape needs a size of at least 1"},

@@ -305,9 +305,9 @@ TEST_CASE("a place after the arguments does not count as one", "[macro]") {
 TEST_CASE("a place beyond the end of a macro is clamped, with a warning", "[macro]") {
   const std::string models = "@s chain 5 1 1 0 0 0\n@q mesh 3 3 1 1 0 0 0\n";
   const std::string beyond = "a place on a macro goes from 0 to 1; ";
-  check_warning(models + "@out1 posOutput [@s 1.5]", 3, 21, beyond + "'1.5' is taken as 1");
-  check_warning(models + "@out1 posOutput [@q 1 -0.1]", 3, 23, beyond + "'-0.1' is taken as 0");
-  check_warning(models + "@out1 posOutput @s 2", 3, 20, beyond + "'2' is taken as 1");
+  check_warning(models + "@out1 posOutput [@s 1.5]", 3, 21, beyond + "'1.5' is read as 1");
+  check_warning(models + "@out1 posOutput [@q 1 -0.1]", 3, 23, beyond + "'-0.1' is read as 0");
+  check_warning(models + "@out1 posOutput @s 2", 3, 20, beyond + "'2' is read as 1");
   messages::check_told(models + "@out1 posOutput [@q 0 1]", {});
 }
 

@@ -326,7 +326,7 @@ TEST_CASE("every error has a line, a column and the expected text", "[mdl]") {
        "found a zero byte: this is a binary file, not a model"},
       {std::string(1, '\0'), 1, 1, "found a zero byte: this is a binary file, not a model"},
       {std::string(max_model_bytes + 1, '\n'), 1, 1,
-       "the model is longer than the 32 MiB that are read"},
+       "the model is longer than the limit of 32 MiB"},
   };
   for (const Complaint& complaint : complaints) {
     check_error(complaint);

@@ -46,7 +46,7 @@ TEST_CASE("the reader reports the meaning of a motion and the reason", "[motion]
            Case{"@a mass 1 1 2\n@b osc 1 1 1 1 0", velocity,
                 per_second + "line 2 rests away from 0 with a motion of 0"},
            Case{"@a mass 1 [0 0 1] 2", velocity,
-                per_second + "line 1 writes a place as [x y z], which is MIMS4Max"},
+                per_second + "line 1 writes a position as [x y z], which is MIMS4Max"},
            Case{"@a mass [2*3] 1 2", velocity,
                 per_second + "line 1 writes an argument in brackets, which is MIMS4Max"},
            Case{"@a mass 1 1 1 2", velocity,
@@ -127,10 +127,9 @@ TEST_CASE("states that fit both meanings are read as rest, with a warning", "[mo
     CHECK(initial_velocity(parsed.network, mass) == 0.0);
   }
   CHECK(doubt(parsed) ==
-        "2: a motion of 0 is read as rest, although the motion is the position one sample before, "
-        "as line 1 rests with a motion equal to its position; '~motion velocity' or '~motion "
-        "delayed' "
-        "ends this doubt");
+        "2: a motion of 0 is read as rest, although motions are the position one sample before, as "
+        "line 1 rests with a motion equal to its position; add '~motion velocity' or '~motion "
+        "delayed' to decide");
 }
 
 TEST_CASE("a mix of dialects causes a warning only if something moves", "[motion]") {
@@ -140,8 +139,8 @@ TEST_CASE("a mix of dialects causes a warning only if something moves", "[motion
   CHECK(moving.network.third == velocity);
   CHECK(doubt(moving) ==
         "5: its motion is read as a velocity in units per second, as line 4 has 'nlContact', which "
-        "is MIMS4Max; but line 3 has 'massG', which is MIMS: '~motion delayed' reads the motions "
-        "as MIMS does, '~motion velocity' ends this doubt");
+        "is MIMS4Max; but line 3 has 'massG', which is MIMS: add '~motion delayed' to read the "
+        "motions as MIMS does, or '~motion velocity' to keep this reading");
   CHECK(doubt(parse_network(both)).empty());
   CHECK(doubt(parse_network(both + "@c mass 1 2 0")).empty());
   CHECK(doubt(parse_network(both + "@c mass 1 2 1\n~motion velocity")).empty());

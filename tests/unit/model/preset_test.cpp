@@ -201,7 +201,7 @@ TEST_CASE("reserved OSC addresses are rejected", "[preset]") {
       address.replace(at, 3, "/1/");
     }
     check_error({with_control("to = \"in1\"\nfrom = \"" + address + "\""), 4, 8,
-                 "'" + address + "' is an address of the program's own"});
+                 "'" + address + "' is reserved by ressort"});
   }
   for (const std::string address : {"/a", "/note/onset", "/params/x", "/inner/1", "/a-b_c.d/2!"}) {
     CHECK(control_of("to = \"in1\"\nfrom = \"" + address + "\"").address == address);
@@ -228,8 +228,7 @@ TEST_CASE("errors in presets have a line and a column", "[preset]") {
       {m + "damper_s = 61", 2, 12, "'damper_s' must lie between 0 and 60"},
       {m + "decay_s = 601", 2, 11, "'decay_s' must lie between 0.001 and 600"},
       {m + "tuning = \"fixed\"\nkeys_db = 3", 3, 11,
-       "'keys_db' is for keys that are notes of their own, and with tuning = \"fixed\" all of them "
-       "play one"},
+       "'keys_db' has no effect with tuning = \"fixed\", where all keys play the same note"},
       {m + "decay_s = [[36, 0], [96, 1]]", 2, 12,
        "a key lies between 0 and 127, its seconds between 0.001 and 600"},
       {m + "[[control]]\nfrom = \"note\"\n" + to + "round_robin = [1.5, 2]", 5, 15,
@@ -251,7 +250,7 @@ TEST_CASE("errors in presets have a line and a column", "[preset]") {
       {m + "[parameters]\nK = { value = 2, range = [0, 1] }", 3, 5,
        "the value of 'K' lies outside its range"},
       {m + "[parameters]\nK = { value = 0.5, range = [1, 0] }", 3, 28,
-       "'range' is the wrong way round: the lower number comes first, [low, high]"},
+       "'range' is the wrong way round: write the lower number first, [low, high]"},
       {m + "[parameters]\nK = { value = 1, range = [0, 1], unit = 1 }", 3, 41,
        "unknown key 'unit' in the parameter 'K'; there are value, range"},
       {m + "[parameters]\nK = { value = 1, range = 3 }", 3, 26,
@@ -277,9 +276,8 @@ TEST_CASE("errors in presets have a line and a column", "[preset]") {
       {with_control(to + "from = \"/a,b\""), 4, 8, "an OSC name has"},
       {with_control(to + "from = \"/d\u00e9\""), 4, 8, "an OSC name has"},
       {with_control(to + "from = \"/" + std::string(255, 'a') + "\""), 4, 8, "an OSC name has"},
-      {with_control(to + "from = \"/in/1/x\""), 4, 8,
-       "'/in/1/x' is an address of the program's own"},
-      {with_control(to + "from = \"/error\""), 4, 8, "'/error' is an address of the program's own"},
+      {with_control(to + "from = \"/in/1/x\""), 4, 8, "'/in/1/x' is reserved by ressort"},
+      {with_control(to + "from = \"/error\""), 4, 8, "'/error' is reserved by ressort"},
       {"model = \"x\"", 1, 9, "'model' must be the name of a .mdl file"},
       {"model = \"/etc/passwd\"", 1, 9, "'model' must be the name of a .mdl file"},
       {with_control("from = \"note\""), 2, 1, "a control needs 'to'"},
@@ -346,7 +344,7 @@ TEST_CASE("deeply nested TOML is rejected before parsing", "[preset]") {
     }
     return all;
   };
-  const std::string message = "this is nested more than 8 deep";
+  const std::string message = "this is nested more than 8 levels deep";
   check_error({repeated(32000, "a.") + "a = 1", 1, 18, message});
   check_error({"model = \"x\"\n[" + repeated(30000, "a.") + "a]", 2, 19, message});
   check_error({"a = " + repeated(60000, "["), 1, 13, message});

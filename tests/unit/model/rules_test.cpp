@@ -307,13 +307,13 @@ TEST_CASE("display triples and blocks are kept as groups", "[rules]") {
   check_error(
       "@a mass 1 0 0 0 7 7", 1, 17,
       "'mass' takes 3 to 4 arguments (M [G] POSITION MOTION), found 6; a drawing is GROUP X "
-      "Y, and '0' is no group");
+      "Y, but '0' is not a group's name");
   check_error("@g ground 0 -1 7 7", 1, 13,
-              "'ground' takes 1 argument (POSITION), found 4; a drawing is GROUP X Y, and '-1' is "
-              "no group");
+              "'ground' takes 1 argument (POSITION), found 4; a drawing is GROUP X Y, but '-1' is "
+              "not a group's name");
   check_error("@o osc 1 1 1 0 0 [1 2 3] 7 7", 1, 26,
               "'osc' takes 5 to 6 arguments (M K Z [G] POSITION MOTION), found 8; a drawing is "
-              "GROUP X Y, and '[1 2 3]' is no group");
+              "GROUP X Y, but '[1 2 3]' is not a group's name");
   check_error("@a mass 1 0 0 skin x 0", 1, 20,
               "found 'x' where a number was expected (a state at the start cannot be a parameter)");
 }
@@ -411,9 +411,9 @@ TEST_CASE("unusual networks are accepted with warnings", "[rules]") {
       "below '@in1'");
   check_told(sounding + "@in1 posInput 0\n@k contact @b @in1 1 1 1", {});
   check_warning(sounding + "@g ground 0\n@k spring @g @a 1\n @in1 frcInput @g", 7, 2,
-                "'@in1' pushes '@g', which never moves: it does nothing");
+                "'@in1' pushes '@g', which never moves: it has no effect");
   check_warning(sounding + "@in1 posInput 0\n@k spring @in1 @a 1\n@in2 frcInput @in1", 7, 1,
-                "'@in2' pushes '@in1', which moves only as its input says: it does nothing");
+                "'@in2' pushes '@in1', which only follows its input: it has no effect");
   check_error("@p param 1", 1, 1, "the model has no masses, so it makes no sound");
   check_error("# nothing", 1, 1,
               "the model is empty: expected elements such as '@m mass 1. 0. 0.'");

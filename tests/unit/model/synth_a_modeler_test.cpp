@@ -208,31 +208,30 @@ TEST_CASE("errors in Synth-A-Modeler files have a line", "[synth_a_modeler]") {
   check_error("mass(1.0,0.0,0.0),m;\nlink(1.0,0.0,0.0),l,m,n;\n", 2, 23,
               "there is no element called 'n'; did you mean 'm'?");
   check_error("ground(0.0),g;\nground(0.0),g;\n", 2, 13, "'g' is already declared in line 1");
-  check_error("mass(1.0,0.0,0.0),m;\npulseTouch(1.0,0.0,0.0,1.0,1.0,1.0),t,m,m;\n", 2, 1,
-              "'pulseTouch' is not read: write a touch, and strike by a force input of a model of "
-              "ours");
+  check_error(
+      "mass(1.0,0.0,0.0),m;\npulseTouch(1.0,0.0,0.0,1.0,1.0,1.0),t,m,m;\n", 2, 1,
+      "'pulseTouch' is not supported: write a touch, or convert the model and strike it by a "
+      "force input");
   check_error("faustcode: eq=highpass(4,20.0);\nport(),p;\n", 1, 15,
               "found 'highpass' where a number, a slider or a constant was expected; other FAUST "
-              "code is not read");
+              "code is not supported");
   check_error("faustcode: a=b*2.0;\nfaustcode: b=a+1.0;\nport(),p;\n", 2, 14,
               "'a' is defined in terms of itself");
   check_error("port(),p;\naudioout,a,p:lowpass(1,100.0);\n", 2, 13,
-              "found ':lowpass(1,100.0)' where the ';' was expected: FAUST code behind what is "
-              "heard is not read");
+              "found ':lowpass(1,100.0)' where ';' was expected: other FAUST code is not "
+              "supported");
   std::string odd = string_of_two;
   odd.replace(odd.find("w1,j,fret"), 9, "w1,j,j");
   CHECK_FALSE(parse_network(odd).ok());
   odd = string_of_two;
   odd.replace(odd.find("0.5,simpleString(0.02,0.003"), 3, "0.7");
-  check_error(odd, 4, 11,
-              "a row of waveguides has one impedance, here 22050 per sample: others "
-              "are not read");
+  check_error(odd, 4, 11, "a row of waveguides must have one impedance, here 22050 per sample");
   check_error(string_of_two +
                   "termination(memorylessStringTerm(-0.9)),t;\n"
                   "waveguide(0.5,simpleString(0.02,0.002)),w2,t,j;\n",
               7, 15,
-              "a junction joins two waveguides, but this one joins 3; more are not read: link "
-              "junctions of two by a stiff link");
+              "a junction joins two waveguides, but this one joins 3; connect "
+              "junctions of two by a stiff link instead");
 }
 
 TEST_CASE("approximate translations cause a warning", "[synth_a_modeler]") {
