@@ -15,7 +15,7 @@ namespace ressort {
 namespace {
 
 // Turns an output error into a failure, even if everything else succeeded.
-int said(int code) {
+int check_output(int code) {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) {
     return code;
   }
@@ -35,7 +35,7 @@ int run_program(int (*work)(int argc, char** argv), int argc, char** argv) {
   }
   signal(SIGXFSZ, SIG_IGN);  // so that a file size limit is an error like a full disk
   try {
-    return said(work(argc, argv));
+    return check_output(work(argc, argv));
   } catch (const std::bad_alloc&) {
     std::fputs("not enough memory; use a smaller model or fewer voices\n", stderr);
     return exit_code::wrong_use;

@@ -40,9 +40,9 @@ void write_all(int descriptor, const std::string& text) {
 
 // Writes the lines on a thread of its own. The thread may block for ever, so it is never joined and
 // this object is never destroyed.
-class Mouth {
+class LinePrinter {
  public:
-  Mouth() {
+  LinePrinter() {
     std::thread([this] { run(); }).detach();
   }
 
@@ -63,7 +63,7 @@ class Mouth {
     return idle_.wait_for(lock, patience, [this] { return lines_.empty() || is_silent_; });
   }
 
-  void fall_silent() {
+  void stop_messages() {
     const std::lock_guard lock(mutex_);
     is_silent_ = true;
     lines_.resize(std::min<std::size_t>(lines_.size(), 1));  // the first is being written
@@ -106,8 +106,8 @@ class Mouth {
   bool is_silent_ = false;
 };
 
-Mouth& mouth() {
-  static Mouth* const one = new Mouth;
+LinePrinter& printer() {
+  static LinePrinter* const one = new LinePrinter;
   return *one;
 }
 
@@ -154,16 +154,16 @@ std::string for_terminal(const std::string& text) {
 }
 
 void say(const std::string& line) {
-  mouth().put(STDOUT_FILENO, for_terminal(line));
+  printer().put(STDOUT_FILENO, for_terminal(line));
 }
 void complain(const std::string& line) {
-  mouth().put(STDERR_FILENO, line);
+  printer().put(STDERR_FILENO, line);
 }
-bool wait_until_said() {
-  return mouth().wait();
+bool flush_messages() {
+  return printer().wait();
 }
-void fall_silent() {
-  mouth().fall_silent();
+void stop_messages() {
+  printer().stop_messages();
 }
 
 }  // namespace ressort

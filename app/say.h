@@ -15,9 +15,9 @@ void complain(const std::string& line);
 std::string for_terminal(const std::string& text);
 
 // Waits until everything is printed; returns false after 0.2 s if nobody reads.
-bool wait_until_said();
+bool flush_messages();
 
 // Drops all unprinted lines and prints nothing more: the program ends.
-void fall_silent();
+void stop_messages();
 
 }  // namespace ressort

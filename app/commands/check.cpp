@@ -202,8 +202,8 @@ void warn(const Proved& proved, const Scene& scene, std::vector<Finding>& findin
 // Warns if the CPU is too slow for all voices.
 void warn(const Scene& scene, const Compiled& compiled, std::vector<Finding>& findings) {
   const CompileOptions options;
-  const std::string text =
-      too_much(compiled.plan, compiled.instrument.voices, options.rate_hz, options.precision);
+  const std::string text = overload_warning(compiled.plan, compiled.instrument.voices,
+                                            options.rate_hz, options.precision);
   if (!text.empty()) {
     Finding finding = finding_of(scene.path, "", Error{text});
     finding.diagnostic.severity = Severity::warning;
@@ -276,24 +276,24 @@ void print_report(const Scene& scene, const Compiled& compiled, const Proved& pr
 }  // namespace
 
 int check(const CheckOptions& options) {
-  LoadNews news(options.name,
-                [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
+  LoadProgress news(options.name,
+                    [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
   const Progress progress([&](std::string_view stage) {
     news.at(stage);
     return true;  // Ctrl-C ends the process
   });
   Reading reading = read_scene(options.name, {.third = options.third, .progress = progress});
-  Admission admission;
+  CompiledScene admission;
   if (reading.scene) {
-    admission = ask_to_play(*reading.scene,
-                            {.method = options.method,
-                             .budget = options.budget,
-                             .progress = progress,
-                             .most_bytes = free_memory_bytes()},
-                            options.is_strict);
+    admission = compile_to_play(*reading.scene,
+                                {.method = options.method,
+                                 .budget = options.budget,
+                                 .progress = progress,
+                                 .most_bytes = free_memory_bytes()},
+                                options.is_strict);
   }
   const std::optional<Compiled>& compiled = admission.compiled;
-  const bool is_ok = compiled && admission.is_granted();
+  const bool is_ok = compiled && admission.is_accepted();
   std::optional<Proved> proved;
   if (compiled && options.as != CheckAs::model) {
     proved = prove(*reading.scene, *compiled, progress);

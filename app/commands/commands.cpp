@@ -58,13 +58,13 @@ std::vector<int> ending_signals() {
 int render_command(const RenderOptions& options, bool is_quiet) {
   std::optional<ProgressBar> bar(!is_quiet);
   RenderOptions watched = options;
-  LoadNews news(options.name, is_quiet ? LoadNews::Tell() : complain);
+  LoadProgress news(options.name, is_quiet ? LoadProgress::Tell() : complain);
   watched.loading = Progress([&](std::string_view stage) {
     news.at(stage);
     return true;  // a signal ends the process
   });
   bool is_watched = false;
-  const auto make = names_flight(options.name) ? render_flight : render;
+  const auto make = is_flight_name(options.name) ? render_flight : render;
   const auto rendered = make(watched, [&](double share) {
     if (!std::exchange(is_watched, true)) {
       watch_signals();
@@ -97,7 +97,7 @@ int render_command(const RenderOptions& options, bool is_quiet) {
     if (rendered->peak > 1.0) {
       complain("the peak exceeds full scale; pass --limit to avoid clipping");
     }
-    const bool was_asked = names_flight(options.name) || !options.score.empty() ||
+    const bool was_asked = is_flight_name(options.name) || !options.score.empty() ||
                            !options.input.empty() || !options.midi.empty();
     if (rendered->peak == 0.0 && rendered->frames > 0 && !was_asked) {
       complain("the output is silent: nothing excites the model; pass --score or --input");

@@ -40,8 +40,8 @@ int export_to_faust(const ExportOptions& options) {
                  options.output.c_str());
     return exit_code::wrong_use;
   }
-  LoadNews news(options.name,
-                [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
+  LoadProgress news(options.name,
+                    [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
   const Progress progress([&](std::string_view stage) {
     news.at(stage);
     return true;  // Ctrl-C ends the process
@@ -55,7 +55,7 @@ int export_to_faust(const ExportOptions& options) {
     std::fprintf(stderr, "%s\n", warning.c_str());
   }
   const std::string read[] = {scene->path, scene->model_path};
-  if (auto spared = spare(options.output, read); !spared) {
+  if (auto spared = check_not_input(options.output, read); !spared) {
     std::fprintf(stderr, "%s\n", spared.error().message.c_str());
     return exit_code::wrong_use;
   }
@@ -73,7 +73,7 @@ int export_to_faust(const ExportOptions& options) {
     std::fputs(text->c_str(), stdout);
     return exit_code::done;
   }
-  return put_text(options.output, *text, options.force);
+  return write_output(options.output, *text, options.force);
 }
 
 }  // namespace ressort::commands

@@ -42,7 +42,7 @@ int make(const MakeOptions& options) {
     std::fwrite(text.data(), 1, text.size(), stdout);
     return exit_code::done;
   }
-  if (const int failure = put_text(options.output, text, options.force)) {
+  if (const int failure = write_output(options.output, text, options.force)) {
     return failure;
   }
   std::printf("%s: %s, %s\n", options.output.c_str(),

@@ -262,7 +262,7 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
   }
   const std::string read[] = {scene->path, scene->model_path, options.score, options.input,
                               options.midi};
-  if (auto spared = spare(options.output, read); !spared) {
+  if (auto spared = check_not_input(options.output, read); !spared) {
     return spared.error();
   }
   const bool is_bare = !scene->has_preset && options.midi.empty();
@@ -339,7 +339,7 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
       process.schedule(0, event);
     }
   }
-  process.slot.offer(new Sounding{std::move(compiled->engine), serial});
+  process.slot.offer(new PlayingEngine{std::move(compiled->engine), serial});
 
   Rendered rendered{.name = scene->name,
                     .rate_hz = options.rate_hz,

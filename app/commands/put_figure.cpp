@@ -13,7 +13,7 @@ int put_figure(const std::string& path, const plot::Figure& figure, bool force) 
     std::fprintf(stderr, "%s: not drawn: %s\n", path.c_str(), svg.error().message.c_str());
     return exit_code::our_failure;
   }
-  return put_text(path, *svg, force);
+  return write_output(path, *svg, force);
 }
 
 }  // namespace ressort::commands

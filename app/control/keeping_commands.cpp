@@ -23,7 +23,7 @@ Result<Done> command::save(ConsoleContext& console, Words words) {
 }
 
 Result<Done> command::flight(ConsoleContext& console, Words words) {
-  const std::string path = names_flight(words[0]) ? words[0] : words[0] + ".ressort";
+  const std::string path = is_flight_name(words[0]) ? words[0] : words[0] + ".ressort";
   const auto written =
       console.session.write_flight(path, words.size() > 1 ? Existing::replace : Existing::refuse);
   if (!written) {

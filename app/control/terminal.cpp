@@ -153,8 +153,8 @@ struct Terminal::Input {
     }
     rouse();
     constexpr std::chrono::milliseconds patience{200};
-    if (over.wait_for(patience) != std::future_status::ready && !wait_until_said()) {
-      fall_silent();
+    if (over.wait_for(patience) != std::future_status::ready && !flush_messages()) {
+      stop_messages();
     }
     constexpr std::chrono::milliseconds moment{10};
     while (over.wait_for(moment) != std::future_status::ready) {
@@ -320,7 +320,7 @@ struct Terminal::Input {
     bool goes_on = true;
     while (goes_on) {
       el_resize(editor);
-      wait_until_said();  // The prompt is printed after it.
+      flush_messages();  // The prompt is printed after it.
       set_editing(true);
       int count = 0;
       const char* const typed = el_gets(editor, &count);

@@ -236,12 +236,12 @@ void open_capture(Alsa& alsa, int wanted) {
   alsa.captured.set(alsa.in.get());
 }
 
-void say_nothing(const char*, int, const char*, int, const char*, ...) {}
+void ignore_message(const char*, int, const char*, int, const char*, ...) {}
 
 }  // namespace
 
 Result<AudioDevice> open_alsa(Process& process, const AudioOptions& options) {
-  snd_lib_error_set_handler(say_nothing);
+  snd_lib_error_set_handler(ignore_message);
   auto alsa = std::make_shared<Alsa>(process);
   alsa->device = options.device;
   int failure = snd_pcm_open(&alsa->out.pcm, options.device.c_str(), SND_PCM_STREAM_PLAYBACK, 0);

@@ -45,7 +45,8 @@ struct Jack {
 
   // Used by the control thread only.
   Wiring wiring;
-  std::map<const jack_port_t*, std::string> others;  // ports that were connected to us, by name
+  std::map<const jack_port_t*, std::string>
+      connected_names;           // ports that were connected to us, by name
   std::int64_t next_try_ns = 0;  // time of the next attempt to restore connections
 
   // Used by the audio thread only.
@@ -142,18 +143,18 @@ void on_port(jack_port_id_t id, int is_there, void* self) {
   jack.rewired.raise();
 }
 
-void say_nothing(const char*) {}
+void ignore_message(const char*) {}
 
-bool plug(Jack& jack, jack_port_t* ours, const char* theirs) {
+bool connect_port(Jack& jack, jack_port_t* ours, const char* theirs) {
   const char* const name = jack_port_name(ours);
   const bool is_output = (jack_port_flags(ours) & JackPortIsOutput) != 0;
   return jack_connect(jack.client, is_output ? name : theirs, is_output ? theirs : name) == 0;
 }
 
 // Connects ports for -j, unless a person has removed this connection.
-void plug_anew(Jack& jack, jack_port_t* ours, const char* theirs) {
+void connect_unless_removed(Jack& jack, jack_port_t* ours, const char* theirs) {
   if (!jack.wiring.knows({jack_port_short_name(ours), theirs})) {
-    plug(jack, ours, theirs);
+    connect_port(jack, ours, theirs);
   }
 }
 
@@ -164,7 +165,7 @@ void connect(Jack& jack) {
                        jack_free);
   for (std::size_t i = 0; speakers && i < jack.outputs.size() && speakers.get()[i] != nullptr;
        ++i) {
-    plug_anew(jack, jack.outputs[i], speakers.get()[i]);
+    connect_unless_removed(jack, jack.outputs[i], speakers.get()[i]);
   }
 }
 
@@ -173,7 +174,7 @@ void connect_midi(Jack& jack) {
                                        JackPortIsPhysical | JackPortIsOutput),
                         jack_free);
   for (std::size_t i = 0; keyboards && keyboards.get()[i] != nullptr; ++i) {
-    plug_anew(jack, jack.midi, keyboards.get()[i]);
+    connect_unless_removed(jack, jack.midi, keyboards.get()[i]);
   }
 }
 
@@ -187,7 +188,7 @@ void connect_inputs(Jack& jack) {
       return;
     }
     if (jack_port_connected(port) == 0) {
-      plug_anew(jack, port, microphones.get()[i]);
+      connect_unless_removed(jack, port, microphones.get()[i]);
     }
   }
 }
@@ -233,22 +234,22 @@ std::vector<jack_port_t*> own_ports(const Jack& jack) {
 
 // Marks the connections of unregistered ports as lost. JACK may have reused the port objects, so
 // their names are the ones seen at the last update.
-void lose_ports(Jack& jack) {
+void mark_lost_ports(Jack& jack) {
   std::vector<const jack_port_t*> gone;
   {
     const std::lock_guard lock(jack.mutex);
     gone = std::exchange(jack.gone, {});
   }
   for (const jack_port_t* const port : gone) {
-    if (const auto known = jack.others.find(port); known != jack.others.end()) {
-      jack.wiring.lose(known->second);
+    if (const auto known = jack.connected_names.find(port); known != jack.connected_names.end()) {
+      jack.wiring.mark_missing(known->second);
     }
   }
 }
 
 // Reads the current connections and restores the missing ones.
-void look_at_ports(Jack& jack, bool is_quiet) {
-  lose_ports(jack);
+void update_wiring(Jack& jack, bool is_quiet) {
+  mark_lost_ports(jack);
   const std::vector<jack_port_t*> ports = own_ports(jack);
   std::vector<Cable> present;
   for (jack_port_t* const port : ports) {
@@ -260,19 +261,19 @@ void look_at_ports(Jack& jack, bool is_quiet) {
   const auto exists = [&](const std::string& port) {
     return jack_port_by_name(jack.client, port.c_str()) != nullptr;
   };
-  jack.wiring.look(present, exists, is_quiet);
+  jack.wiring.update(present, exists, is_quiet);
   // Keep the names while a cable is doubtful: the notification that its port is gone may follow.
   if (!jack.wiring.is_in_doubt()) {
-    jack.others.clear();
+    jack.connected_names.clear();
   }
   for (const Cable& cable : present) {
-    jack.others.insert_or_assign(jack_port_by_name(jack.client, cable.theirs.c_str()),
-                                 cable.theirs);
+    jack.connected_names.insert_or_assign(jack_port_by_name(jack.client, cable.theirs.c_str()),
+                                          cable.theirs);
   }
   for (const Cable& cable : jack.wiring.missing()) {
     for (jack_port_t* const port : ports) {
       if (jack_port_short_name(port) == cable.ours && exists(cable.theirs)) {
-        plug(jack, port, cable.theirs.c_str());
+        connect_port(jack, port, cable.theirs.c_str());
       }
     }
   }
@@ -289,7 +290,7 @@ void tick(Jack& jack) {
   const std::int64_t now_ns = monotonic_ns();
   const bool has_changed = jack.rewired.lower();
   if (has_changed || now_ns >= jack.next_try_ns) {
-    look_at_ports(jack, !has_changed);
+    update_wiring(jack, !has_changed);
     jack.next_try_ns = now_ns + (jack.wiring.is_in_doubt() ? doubt_ns : patience_ns);
   }
 }
@@ -324,8 +325,8 @@ bool register_ports(Jack& jack) {
 }  // namespace
 
 Result<AudioDevice> open_jack(Process& process, const AudioOptions& options) {
-  jack_set_error_function(say_nothing);
-  jack_set_info_function(say_nothing);
+  jack_set_error_function(ignore_message);
+  jack_set_info_function(ignore_message);
   auto jack = std::make_shared<Jack>(process, options);
   jack_status_t status{};
   jack->client = jack_client_open(options.client_name.c_str(), JackNoStartServer, &status);
@@ -358,7 +359,7 @@ Result<AudioDevice> open_jack(Process& process, const AudioOptions& options) {
   if (options.connect) {
     connect(*jack);
   }
-  look_at_ports(*jack, true);
+  update_wiring(*jack, true);
   AudioDevice device;
   device.rate_hz = jack->rate_hz;
   device.description = "JACK client '" + std::string(jack_get_client_name(jack->client)) + "', " +
@@ -380,7 +381,7 @@ Result<AudioDevice> open_jack(Process& process, const AudioOptions& options) {
   };
   device.wiring = [jack] {
     Wiring wiring = jack->wiring;
-    wiring.lose_all();
+    wiring.mark_all_missing();
     return wiring;
   };
   return device;

@@ -14,9 +14,9 @@ namespace ressort::devices {
 
 // The entry for MIDI packets with a time of arrival. They are played one period later, at constant
 // latency. Tests call it as RtMidi does.
-class MidiDoor {
+class MidiSink {
  public:
-  explicit MidiDoor(Process& process) : process_(process) {}
+  explicit MidiSink(Process& process) : process_(process) {}
 
   // Plays a packet. `reader` keeps the running status of one source. The lock is shared by the
   // sources only, never by the audio thread. [any thread but audio]
@@ -34,7 +34,7 @@ enum class MidiApi { alsa, jack };
 class MidiInput {
  public:
   static Result<std::unique_ptr<MidiInput>> open(MidiApi api, const std::string& client_name,
-                                                 bool connect, MidiDoor& door);
+                                                 bool connect, MidiSink& door);
   ~MidiInput();
 
   // Connects new sources and drops unplugged ones. Call it about once a second. [control]

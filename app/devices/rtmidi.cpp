@@ -12,7 +12,7 @@ namespace ressort::devices {
 namespace {
 
 struct MidiPort {
-  MidiPort(RtMidi::Api api, const std::string& client, MidiDoor& door_in)
+  MidiPort(RtMidi::Api api, const std::string& client, MidiSink& door_in)
       : door(door_in), input(api, client) {
     input.setCallback(arrived, this);
     input.ignoreTypes(false, true, true);  // false: receive system exclusive messages, for tunings
@@ -26,16 +26,16 @@ struct MidiPort {
     port.door.arrive(port.reader, *bytes, monotonic_ns());
   }
 
-  MidiDoor& door;
+  MidiSink& door;
   MidiReader reader;
   RtMidiIn input;
 };
 
-void say_nothing(RtMidiError::Type, const std::string&, void*) {}
+void ignore_message(RtMidiError::Type, const std::string&, void*) {}
 
 }  // namespace
 
-void MidiDoor::arrive(MidiReader& reader, std::span<const std::uint8_t> bytes,
+void MidiSink::arrive(MidiReader& reader, std::span<const std::uint8_t> bytes,
                       std::int64_t time_ns) {
   const std::lock_guard lock(mutex_);
   reader.read(bytes, [&](const Event& event) {
@@ -48,7 +48,7 @@ struct MidiInput::Sources {
   RtMidi::Api api;
   std::string client;
   bool connect;
-  MidiDoor& door;
+  MidiSink& door;
   std::unique_ptr<MidiPort> own;                             // the port that others connect to
   std::map<std::string, std::unique_ptr<MidiPort>> sources;  // by name
 };
@@ -57,7 +57,7 @@ MidiInput::MidiInput(std::unique_ptr<Sources> sources) : sources_(std::move(sour
 MidiInput::~MidiInput() = default;
 
 Result<std::unique_ptr<MidiInput>> MidiInput::open(MidiApi api, const std::string& client_name,
-                                                   bool connect, MidiDoor& door) {
+                                                   bool connect, MidiSink& door) {
   const Error missing{api == MidiApi::alsa
                           ? "there is no ALSA sequencer (/dev/snd/seq), so there is no "
                             "MIDI through ALSA; play by OSC or from the console"
@@ -70,7 +70,7 @@ Result<std::unique_ptr<MidiInput>> MidiInput::open(MidiApi api, const std::strin
     auto sources = std::make_unique<Sources>(Sources{rt_api, client_name, connect, door, {}, {}});
     sources->own = std::make_unique<MidiPort>(rt_api, client_name, door);
     sources->own->input.openVirtualPort("midi_in");
-    sources->own->input.setErrorCallback(say_nothing);
+    sources->own->input.setErrorCallback(ignore_message);
     auto input = std::unique_ptr<MidiInput>(new MidiInput(std::move(sources)));
     input->tick();
     return input;

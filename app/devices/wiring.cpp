@@ -4,8 +4,8 @@
 
 namespace ressort::devices {
 
-void Wiring::look(const std::vector<Cable>& present,
-                  const std::function<bool(const std::string& port)>& exists, bool is_quiet) {
+void Wiring::update(const std::vector<Cable>& present,
+                    const std::function<bool(const std::string& port)>& exists, bool is_quiet) {
   for (Known& known : known_) {
     const bool is_there = std::find(present.begin(), present.end(), known.cable) != present.end();
     if (is_there) {
@@ -46,7 +46,7 @@ bool Wiring::knows(const Cable& cable) const {
                      [&](const Known& known) { return known.cable == cable; });
 }
 
-void Wiring::lose(const std::string& theirs) {
+void Wiring::mark_missing(const std::string& theirs) {
   for (Known& known : known_) {
     if (known.cable.theirs == theirs && known.state != State::pulled) {
       known.state = State::missing;
@@ -54,7 +54,7 @@ void Wiring::lose(const std::string& theirs) {
   }
 }
 
-void Wiring::lose_all() {
+void Wiring::mark_all_missing() {
   for (Known& known : known_) {
     if (known.state != State::pulled) {
       known.state = State::missing;
@@ -62,7 +62,7 @@ void Wiring::lose_all() {
   }
 }
 
-void Wiring::expect(const Cable& cable) {
+void Wiring::add_missing(const Cable& cable) {
   if (!knows(cable)) {
     known_.push_back({cable, State::missing});
   }

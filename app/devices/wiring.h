@@ -25,8 +25,8 @@ class Wiring {
   // Updates the states from all present connections. A connection that is gone was removed by a
   // person if its other port still exists at a later update without changes (`is_quiet`): a closing
   // client loses its connections first and its ports afterwards.
-  void look(const std::vector<Cable>& present,
-            const std::function<bool(const std::string& port)>& exists, bool is_quiet);
+  void update(const std::vector<Cable>& present,
+              const std::function<bool(const std::string& port)>& exists, bool is_quiet);
 
   // Returns true if a connection is gone and a later update will tell why.
   bool is_in_doubt() const;
@@ -38,12 +38,12 @@ class Wiring {
   bool knows(const Cable& cable) const;
 
   // Marks all connections of this port as missing, even if the port has come back meanwhile.
-  void lose(const std::string& theirs);
+  void mark_missing(const std::string& theirs);
   // Marks all connections as missing, because the device is gone.
-  void lose_all();
+  void mark_all_missing();
 
   // Adds a connection to restore.
-  void expect(const Cable& cable);
+  void add_missing(const Cable& cable);
 
  private:
   enum class State { plugged, doubtful, missing, pulled };

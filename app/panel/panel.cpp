@@ -330,10 +330,11 @@ struct WebPanel::Server {
     const Progress progress([this](std::string_view) { return pause({}); });
     try {
       const Session::Present present = session.present();
-      const auto modes = present.values.size() == now->network->parameters.size()
-                             ? modes_json(*now, present.values,
-                                          session.status(Asker::panel).rate_hz, count, progress)
-                             : Result<std::string>(Error{"another model is being loaded"});
+      const auto modes =
+          present.values.size() == now->network->parameters.size()
+              ? modes_json(*now, present.values, session.status(MeterReader::panel).rate_hz, count,
+                           progress)
+              : Result<std::string>(Error{"another model is being loaded"});
       if (modes) {
         response.set_content(*modes, "application/json");
       } else {
@@ -414,7 +415,7 @@ struct WebPanel::Server {
       const auto frames = timbre.since(told_frame);
       told_frame = frames.empty() ? told_frame : frames.back().number;
       shape = frames.empty() ? shape : frames.back().timbre.shape;
-      told_status = status_json(session.status(Asker::panel), shape);
+      told_status = status_json(session.status(MeterReader::panel), shape);
     }
     return told_status;
   }

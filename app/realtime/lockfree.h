@@ -191,9 +191,9 @@ class Claim {
 // A hazard pointer (Michael, 2004): a pointer that its owner shows for a while. Each user announces
 // that it uses the pointer, so the owner knows when it may delete the object.
 template <class T>
-class Shown {
+class HazardPointer {
  public:
-  explicit Shown(std::size_t users) : users_(users) {}
+  explicit HazardPointer(std::size_t users) : users_(users) {}
   // Returns false if another pointer is shown. [its owner] wait-free
   bool show(T* value) {
     T* nothing = nullptr;
@@ -233,7 +233,7 @@ class Shown {
 };
 
 // A time of the monotonic clock in ns, written by one thread and read by others.
-class Moment {
+class AtomicTime {
  public:
   void set(std::int64_t time_ns) { time_ns_.store(time_ns, std::memory_order_relaxed); }
   std::int64_t get() const { return time_ns_.load(std::memory_order_relaxed); }
@@ -293,7 +293,7 @@ struct ClockReading {
 // A sequence lock: a value that one thread writes and any thread reads as a whole. The writer never
 // waits; a reader retries while the value is being written.
 template <class T>
-class Board {
+class SeqLock {
  public:
   static_assert(std::is_trivially_copyable_v<T>);
 

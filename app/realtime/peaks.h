@@ -13,7 +13,7 @@ namespace ressort::realtime {
 
 // A reader of the meters. Each one sees the peaks since its own last reading; all OSC clients are
 // one reader, and so are all panels.
-enum class Asker : std::uint8_t { console, osc, panel };
+enum class MeterReader : std::uint8_t { console, osc, panel };
 
 class Peaks {
  public:
@@ -26,7 +26,7 @@ class Peaks {
     }
   }
   // Replaces the peaks in `meters` by those since this reader's last call.
-  void take(Asker asker, Meters& meters) {
+  void take(MeterReader asker, Meters& meters) {
     const Seen seen = std::exchange(seen_[static_cast<std::size_t>(asker)], {});
     meters.cpu_peak = seen.cpu;
     meters.peak = seen.output;

@@ -89,12 +89,12 @@ void Process::run(std::span<const Sample* const> inputs, std::span<Sample* const
   const std::int64_t start_ns = clock_ns_ != nullptr ? clock_ns_() : 0;
   const DenormalsFlushed flushed;
   clock.write({frame_, time_ns, rate_hz_, static_cast<std::int64_t>(frames)});
-  learn();
+  apply_mapping_changes();
   const std::size_t input_count = std::min(inputs.size(), max_channels);
   const std::size_t output_count = std::min(outputs.size(), max_channels);
   if (frames > 0) {
-    keep_period(frames, output_count);
-    gather(frames, midi, time_ns);
+    log_period(frames, output_count);
+    collect_events(frames, midi, time_ns);
   }
   for (std::size_t at = 0; at < frames; at += chunk_frames) {
     const std::size_t n = std::min(chunk_frames, frames - at);
@@ -123,14 +123,14 @@ void Process::run(std::span<const Sample* const> inputs, std::span<Sample* const
       record(output_count, n, records, listens);
     }
     if (frame_ < looked_until_) {
-      hear(output_count, n);
+      keep_output(output_count, n);
     }
     frame_ += static_cast<std::int64_t>(n);
   }
-  look();
-  tell();
+  write_motion();
+  publish_meters();
   if (clock_ns_ != nullptr && !has_time.is_raised()) {
-    weigh(1e-9 * static_cast<double>(clock_ns_() - start_ns), frames);
+    limit_load(1e-9 * static_cast<double>(clock_ns_() - start_ns), frames);
   }
 }
 
@@ -157,7 +157,7 @@ bool Process::schedule(std::int64_t frame, const Event& event) {
     dropped.add(1);
     return false;
   }
-  wait(frame, event);
+  add_pending(frame, event);
   return true;
 }
 
@@ -170,19 +170,21 @@ Meters Process::meters() const {
 }
 
 // Converts everything that has arrived into events at frames.
-void Process::gather(std::size_t frames, std::span<const MidiPacket> midi, std::int64_t time_ns) {
+void Process::collect_events(std::size_t frames, std::span<const MidiPacket> midi,
+                             std::int64_t time_ns) {
   now_.clear();
   next_now_ = 0;
-  drain(from_session, frames, time_ns);  // first, so that an answer to it from another source wins
-  drain(from_osc, frames, time_ns);
-  drain(from_console, frames, time_ns);
-  drain(from_midi, frames, time_ns);
+  // The session first, so that an answer from another source overrides it.
+  read_ring(from_session, frames, time_ns);
+  read_ring(from_osc, frames, time_ns);
+  read_ring(from_console, frames, time_ns);
+  read_ring(from_midi, frames, time_ns);
   const std::size_t before = now_.size();
   const auto last = static_cast<std::int64_t>(frames) - 1;
   for (const MidiPacket& packet : midi) {
     midi_.read(packet.bytes, [&](const Event& event) {
       if (now_.size() - before < max_now + (ends_sound(event) ? max_endings : 0)) {
-        enter(frame_ + std::min<std::int64_t>(packet.frame, last), event);
+        add_now(frame_ + std::min<std::int64_t>(packet.frame, last), event);
       } else {
         dropped.add(1);
       }
@@ -195,45 +197,45 @@ void Process::gather(std::size_t frames, std::span<const MidiPacket> midi, std::
   }
 }
 
-void Process::drain(Ring<TimedEvent>& ring, std::size_t frames, std::int64_t time_ns) {
+void Process::read_ring(Ring<TimedEvent>& ring, std::size_t frames, std::int64_t time_ns) {
   TimedEvent timed;
   // Later arrivals belong to the next block.
   for (std::size_t left = ring.size(); left > 0 && ring.pop(timed); --left) {
     if (timed.timing == TimedEvent::When::at_frame && timed.when >= frame_) {
-      wait(timed.when, timed.event);
+      add_pending(timed.when, timed.event);
     } else if (timed.timing == TimedEvent::When::at_frame) {
       meters_.late_s = static_cast<double>(frame_ - timed.when) / rate_hz_;
       ++meters_.late;
       ahead_.give_back(1);
-      enter(frame_, timed.event);
+      add_now(frame_, timed.event);
     } else if (timed.timing == TimedEvent::When::at_time) {
       // Constant latency: an event of the last period plays at the same offset in this one.
       const double since = static_cast<double>(timed.when - time_ns) * 1e-9 * rate_hz_;
       const auto block = static_cast<std::int64_t>(frames);
-      enter(frame_ + std::clamp<std::int64_t>(block + std::llround(since), 0, block - 1),
-            timed.event);
+      add_now(frame_ + std::clamp<std::int64_t>(block + std::llround(since), 0, block - 1),
+              timed.event);
     } else {
-      enter(frame_, timed.event);
+      add_now(frame_, timed.event);
     }
   }
 }
 
 // Adds an event of this block.
-void Process::enter(std::int64_t frame, const Event& event) {
+void Process::add_now(std::int64_t frame, const Event& event) {
   now_.push_back({frame, order_++, event});
   if (is_panic(event)) {
-    forget_after(frame);
+    discard_after(frame);
   }
 }
 
 // Adds an event for a later frame. Its permit was taken already.
-void Process::wait(std::int64_t frame, const Event& event) {
+void Process::add_pending(std::int64_t frame, const Event& event) {
   latest_ = std::max(latest_, frame);
   pending_.push_back({frame, order_++, event});
   std::push_heap(pending_.begin(), pending_.end(), later<Pending>);
 }
 
-void Process::forget_after(std::int64_t frame) {
+void Process::discard_after(std::int64_t frame) {
   if (latest_ <= frame || is_repeating_) {
     return;  // nothing is left to discard, as in a flood of panics
   }
@@ -257,11 +259,11 @@ void Process::collect_due(std::size_t frames) {
       // The rest of a flood acts at the last cut: early, but complete and in order.
       event.frame = ++moments <= most_moments ? event.frame : due_.back().frame;
     }
-    note(event);
-    translate(event);
+    count_event(event);
+    map_controller(event);
     due_.push_back(event);
-    keep({.frame = frame_ + event.frame, .event = event});
-    follow_program(event);
+    log_record({.frame = frame_ + event.frame, .event = event});
+    follow_banks(event);
   };
   const auto is_due = [&](const Pending& next) { return next.frame < end; };
   while (true) {
@@ -274,7 +276,7 @@ void Process::collect_due(std::size_t frames) {
       ahead_.give_back(1);
       collect(next);
       if (is_panic(next.event)) {
-        forget_after(next.frame);
+        discard_after(next.frame);
       }
     } else if (has_now) {
       collect(now_[next_now_++]);
@@ -286,7 +288,7 @@ void Process::collect_due(std::size_t frames) {
 
 // Follows bank changes here, because models come and go. A program change is reported to the
 // worker, which loads the preset.
-void Process::follow_program(const Event& event) {
+void Process::follow_banks(const Event& event) {
   constexpr int bank_coarse = 0;
   constexpr int bank_fine = 32;
   int& bank = banks_[event.channel % banks_.size()];
@@ -302,7 +304,7 @@ void Process::follow_program(const Event& event) {
 }
 
 // Counts notes and controllers for the meters.
-void Process::note(const Event& event) {
+void Process::count_event(const Event& event) {
   if (event.kind == EventKind::note_on) {
     meters_.last_notes[meters_.notes++ % meters_.last_notes.size()] = {
         static_cast<std::uint8_t>(event.index),
@@ -313,15 +315,15 @@ void Process::note(const Event& event) {
   }
 }
 
-void Process::learn() {
-  Lesson lesson;
-  for (std::size_t left = lessons.size(); left > 0 && lessons.pop(lesson); --left) {
-    learned_[lesson.controller % learned_.size()] = lesson.control;
+void Process::apply_mapping_changes() {
+  MappingChange change;
+  for (std::size_t left = mapping_changes.size(); left > 0 && mapping_changes.pop(change); --left) {
+    learned_[change.controller % learned_.size()] = change.control;
   }
 }
 
 // Replaces a learned controller by its target, if that belongs to the current model.
-void Process::translate(Event& event) {
+void Process::map_controller(Event& event) {
   if (event.kind != EventKind::controller || current_ == nullptr) {
     return;
   }
@@ -345,7 +347,7 @@ void Process::translate(Event& event) {
 // retired. A ringing engine fades when yet another model comes, but not for a new form of the
 // current model.
 void Process::swap_models() {
-  if (rings_ && !rings_on()) {
+  if (rings_ && !is_ringing()) {
     rings_ = false;
     fade_left_ = fade_frames_;
   }
@@ -353,8 +355,8 @@ void Process::swap_models() {
     fading_ = nullptr;
   }
   if (rings_ && slot.is_offered() && slot.has_room()) {
-    Sounding* const next = take();
-    if (goes_on(*next)) {
+    PlayingEngine* const next = take_next_engine();
+    if (continues_current(*next)) {
       slot.retire(std::exchange(current_, next));
       ++meters_.swaps;
     } else {
@@ -366,13 +368,14 @@ void Process::swap_models() {
   if (fading_ != nullptr) {
     return;
   }
-  Sounding* const next = waiting_ != nullptr ? std::exchange(waiting_, nullptr) : take();
+  PlayingEngine* const next =
+      waiting_ != nullptr ? std::exchange(waiting_, nullptr) : take_next_engine();
   if (next == nullptr) {
     return;
   }
   fading_ = current_;
   const bool is_first = fading_ == nullptr;
-  const bool is_same = !is_first && goes_on(*next);
+  const bool is_same = !is_first && continues_current(*next);
   if (!is_first && !is_same) {
     next->engine->adopt_channels(*fading_->engine);
     ended_ = meters_;
@@ -386,11 +389,11 @@ void Process::swap_models() {
   ++meters_.swaps;
 }
 
-bool Process::rings_on() const {
+bool Process::is_ringing() const {
   return fading_->engine->meters().voices > 0 && frame_ < rings_until_;
 }
 
-bool Process::goes_on(const Sounding& next) const {
+bool Process::continues_current(const PlayingEngine& next) const {
   return next.serial != 0 && next.serial == current_->serial &&
          (next.has_new_numbers ? next.engine->renumber_from(*current_->engine)
                                : next.engine->go_on_from(*current_->engine));
@@ -459,7 +462,7 @@ void Process::play_models(std::size_t input_count, std::size_t output_count, std
 
 // An event with a serial acts only in that model. Notes and controllers without one act in both
 // models, so a note that began before a swap ends where it began. The old model gets no new notes.
-void Process::play(Sounding& sounding, std::size_t input_count, std::vector<double>& samples,
+void Process::play(PlayingEngine& sounding, std::size_t input_count, std::vector<double>& samples,
                    std::size_t frames) {
   matching_.clear();
   const bool is_old = &sounding == fading_;
@@ -479,7 +482,7 @@ void Process::play(Sounding& sounding, std::size_t input_count, std::vector<doub
 }
 
 // Publishes the meters and reports changed parameters, after the sound is done.
-void Process::tell() {
+void Process::publish_meters() {
   meters_.frames = static_cast<std::uint64_t>(frame_);
   if (current_ == nullptr) {
     board.write(meters_);
@@ -505,7 +508,7 @@ void Process::tell() {
 
 // Compares the time that the block took with its duration. If the load is too high, ends a fading
 // model first and steals voices then.
-void Process::weigh(double took_s, std::size_t frames) {
+void Process::limit_load(double took_s, std::size_t frames) {
   const double sound_s = static_cast<double>(frames) / rate_hz_;
   load_.add(took_s, sound_s);
   meters_.load = load_.mean();
@@ -516,17 +519,17 @@ void Process::weigh(double took_s, std::size_t frames) {
     return;
   }
   if (load_.is_over() && (rings_ || fade_left_ > 0)) {
-    keep({.frame = frame_, .kind = FlightRecord::Kind::hurry});
-    hurry();
+    log_record({.frame = frame_, .kind = FlightRecord::Kind::hurry});
+    end_fade_early();
     load_.forget();
     return;
   }
   const double load = load_.lasting();
   const int before = load_.limit();
   if (const auto voices = load_.judge(meters_.stepped, current_->engine->voice_count())) {
-    keep({.frame = frame_,
-          .kind = FlightRecord::Kind::limit,
-          .count = static_cast<std::uint32_t>(std::max(0, *voices))});
+    log_record({.frame = frame_,
+                .kind = FlightRecord::Kind::limit,
+                .count = static_cast<std::uint32_t>(std::max(0, *voices))});
     current_->engine->limit_voices(*voices);
   }
   const bool gave_way = load_.limit() > 0 && (before == 0 || load_.limit() < before);
@@ -537,7 +540,7 @@ void Process::weigh(double took_s, std::size_t frames) {
   }
 }
 
-void Process::hurry() {
+void Process::end_fade_early() {
   fading_->engine->limit_voices(1);
   fade_left_ = rings_ ? fade_frames_ : fade_left_;
   rings_ = false;
@@ -565,6 +568,137 @@ void Process::record(std::size_t channels, std::size_t frames, bool records, boo
       listening.push(piece);  // a reader that finds the ring full knows that it lost some
     }
   }
+}
+
+// --- flights ------------------------------------------------------------------------------------
+
+void Process::log_record(const FlightRecord& record) {
+  if (!keeps_flight.is_raised()) {
+    return;
+  }
+  if (has_gap_) {
+    has_gap_ = !flight.push({.frame = record.frame, .kind = FlightRecord::Kind::gap});
+  }
+  has_gap_ = has_gap_ || !flight.push(record);
+}
+
+void Process::log_period(std::size_t frames, std::size_t channels) {
+  if (!keeps_flight.is_raised()) {
+    return;
+  }
+  if (std::exchange(kept_rate_hz_, rate_hz_) != rate_hz_) {
+    log_record({.frame = frame_, .kind = FlightRecord::Kind::rate, .event = {.value = rate_hz_}});
+  }
+  const bool is_other_period = std::exchange(kept_frames_, frames) != frames;
+  const bool has_other_channels = std::exchange(kept_channels_, channels) != channels;
+  if (is_other_period || has_other_channels) {
+    log_record({.frame = frame_,
+                .kind = FlightRecord::Kind::period,
+                .count = static_cast<std::uint32_t>(frames),
+                .channels = static_cast<std::uint32_t>(channels)});
+  }
+}
+
+// Takes the next engine, if there is one.
+PlayingEngine* Process::take_next_engine() {
+  PlayingEngine* const next = slot.take();
+  if (next != nullptr) {
+    log_record({.frame = frame_, .kind = FlightRecord::Kind::take, .count = next->number});
+  }
+  return next;
+}
+
+void Process::play(const SampleTape& tape, std::size_t output_count, std::size_t frames) {
+  for (std::size_t n = 0; n < frames; ++n, ++tape_at_) {
+    const bool is_over = tape_at_ >= tape.frames();
+    for (std::size_t c = 0; c < output_count; ++c) {
+      mixed_[c * chunk_frames + n] =
+          is_over || c >= tape.channels
+              ? 0.0
+              : static_cast<double>(tape.samples[tape_at_ * tape.channels + c]);
+    }
+  }
+  if (tape_at_ >= tape.frames()) {
+    is_tape_over.raise();
+  }
+}
+
+void Process::repeat(const FlightRecord& record) {
+  is_repeating_ = true;
+  keeps_every_frame_ = true;
+  switch (record.kind) {
+    case FlightRecord::Kind::event:
+      return add_pending(record.frame, record.event);
+    case FlightRecord::Kind::rate:
+      return set_rate(record.event.value);
+    case FlightRecord::Kind::limit:
+      return current_ != nullptr ? current_->engine->limit_voices(static_cast<int>(record.count))
+                                 : void();
+    case FlightRecord::Kind::hurry:
+      return fading_ != nullptr ? end_fade_early() : void();
+    case FlightRecord::Kind::period:
+    case FlightRecord::Kind::take:
+    case FlightRecord::Kind::gap:
+      return;  // the caller of block() handles these
+  }
+}
+
+// --- motion frames for the panel ----------------------------------------------------------------
+
+void Process::keep_output(std::size_t channels, std::size_t frames) {
+  const double share = channels > 0 ? 1.0 / static_cast<double>(channels) : 0.0;
+  for (std::size_t n = 0; n < frames; ++n) {
+    double sum = 0.0;
+    for (std::size_t c = 0; c < channels; ++c) {
+      sum += mixed_[c * chunk_frames + n];
+    }
+    heard_[heard_at_] = static_cast<float>(share * sum);
+    heard_at_ = (heard_at_ + 1) % heard_.size();
+  }
+}
+
+// Writes the motion frame that was requested. A stroboscope frame waits for its phase, up to
+// longest_strobe_s. An engine that fades out must not write any more where the next one will.
+void Process::write_motion() {
+  MotionFrame& out = motion.writing();
+  if (strobed_ != nullptr) {
+    const bool is_here = strobed_ == current_;
+    const std::size_t count = is_here ? current_->engine->take_slow_look() : 0;
+    if (count == 0 && is_here && frame_ < strobed_until_) {
+      return;
+    }
+    if (is_here || strobed_ == fading_) {
+      strobed_->engine->look_slowly({});
+    }
+    strobed_ = nullptr;
+    if (count > 0) {
+      out.count = count;
+      return publish_motion();
+    }
+    wants_motion.raise();
+  }
+  const bool is_slow = wants_slow_motion.lower();
+  if (is_slow && current_ != nullptr && current_->picture != 0 &&
+      current_->engine->look_slowly(out.numbers)) {
+    strobed_ = current_;
+    strobed_until_ = frame_ + static_cast<std::int64_t>(longest_strobe_s * rate_hz_);
+  } else if (wants_motion.lower() || is_slow) {
+    out.count =
+        current_ != nullptr && current_->picture != 0 ? current_->engine->look(out.numbers) : 0;
+    publish_motion();
+  }
+}
+
+// Publishes the motion frame with the latest output. From now on the output is kept for the next
+// frame, for looked_for_s.
+void Process::publish_motion() {
+  MotionFrame& out = motion.writing();
+  out.frame = static_cast<std::uint64_t>(frame_);
+  out.picture = current_ != nullptr ? current_->picture : 0;
+  const auto at = heard_.begin() + static_cast<std::ptrdiff_t>(heard_at_);
+  std::copy(heard_.begin(), at, std::copy(at, heard_.end(), out.heard.begin()));
+  motion.publish();
+  looked_until_ = frame_ + static_cast<std::int64_t>(looked_for_s * rate_hz_);
 }
 
 }  // namespace ressort::realtime

@@ -20,7 +20,7 @@ namespace ressort::realtime {
 
 // An engine and the serial that its events carry. An engine with the serial of the current one,
 // unless that is 0, continues the current one's state in the same sample.
-struct Sounding {
+struct PlayingEngine {
   std::unique_ptr<Engine> engine;
   std::uint32_t serial = 0;
   bool lets_ring = false;        // the previous engine gets no new notes and rings out
@@ -68,7 +68,7 @@ struct LearnedControl {
 };
 
 // A change of the learned controllers, on its way to the audio thread.
-struct Lesson {
+struct MappingChange {
   std::uint8_t controller = 0;
   LearnedControl control;
 };
@@ -168,13 +168,13 @@ struct Process {
   Meters meters() const;  // [any thread but audio]
 
   // --- shared with other threads --------------------------------------------------------------
-  Slot<Sounding> slot;  // offered by the session's worker
+  Slot<PlayingEngine> slot;  // offered by the session's worker
   // Written by send() and send_ahead().
   Ring<TimedEvent> from_osc{max_now + max_endings + max_ahead};
   Ring<TimedEvent> from_console{max_now + max_endings};
   Ring<TimedEvent> from_midi{max_now + max_endings};     // written by RtMidi's thread
   Ring<TimedEvent> from_session{max_now + max_endings};  // written by the session's worker
-  Ring<Lesson> lessons{256};                             // written by the session, under its lock
+  Ring<MappingChange> mapping_changes{256};              // written by the session, under its lock
   Ring<Report> reports{4096};                            // read by the session's worker
   Ring<RecordedChunk> recording{8192};
   Flag is_recording;
@@ -187,8 +187,8 @@ struct Process {
   Flag wants_motion;       // requests one motion frame after the next block
   Flag wants_slow_motion;  // the same, at the next phase of the stroboscope
   TripleBuffer<MotionFrame> motion{MotionFrame{}};
-  Board<ClockReading> clock;
-  Board<Meters> board;    // read by meters()
+  SeqLock<ClockReading> clock;
+  SeqLock<Meters> board;  // read by meters()
   Flag meters_were_read;  // raised by a reader; the peaks start again at the next block
   Flag has_time;          // offline or freewheel: no voice is stolen, every event acts at its frame
   Counter dropped;        // counters of Meters, increased by any thread
@@ -205,33 +205,33 @@ struct Process {
   template <class Sample>
   void run(std::span<const Sample* const> inputs, std::span<Sample* const> outputs,
            std::size_t frames, std::span<const MidiPacket> midi, std::int64_t time_ns);
-  void gather(std::size_t frames, std::span<const MidiPacket> midi, std::int64_t time_ns);
-  void drain(Ring<TimedEvent>& ring, std::size_t frames, std::int64_t time_ns);
-  void enter(std::int64_t frame, const Event& event);
-  void wait(std::int64_t frame, const Event& event);
-  void forget_after(std::int64_t frame);
+  void collect_events(std::size_t frames, std::span<const MidiPacket> midi, std::int64_t time_ns);
+  void read_ring(Ring<TimedEvent>& ring, std::size_t frames, std::int64_t time_ns);
+  void add_now(std::int64_t frame, const Event& event);
+  void add_pending(std::int64_t frame, const Event& event);
+  void discard_after(std::int64_t frame);
   void collect_due(std::size_t frames);
-  void note(const Event& event);
-  void learn();
-  void translate(Event& event);
+  void count_event(const Event& event);
+  void apply_mapping_changes();
+  void map_controller(Event& event);
   void play_models(std::size_t input_count, std::size_t output_count, std::size_t frames);
-  void play(Sounding& sounding, std::size_t input_count, std::vector<double>& samples,
+  void play(PlayingEngine& sounding, std::size_t input_count, std::vector<double>& samples,
             std::size_t frames);
   void swap_models();
-  bool rings_on() const;
-  void follow_program(const Event& event);
-  bool goes_on(const Sounding& next) const;
-  void tell();
-  void weigh(double took_s, std::size_t frames);
+  bool is_ringing() const;
+  void follow_banks(const Event& event);
+  bool continues_current(const PlayingEngine& next) const;
+  void publish_meters();
+  void limit_load(double took_s, std::size_t frames);
   void record(std::size_t channels, std::size_t frames, bool records, bool listens);
-  void keep(const FlightRecord& record);
-  void keep_period(std::size_t frames, std::size_t channels);
-  void hurry();
+  void log_record(const FlightRecord& record);
+  void log_period(std::size_t frames, std::size_t channels);
+  void end_fade_early();
   void play(const SampleTape& tape, std::size_t output_count, std::size_t frames);
-  Sounding* take();
-  void hear(std::size_t channels, std::size_t frames);
-  void look();
-  void show();
+  PlayingEngine* take_next_engine();
+  void keep_output(std::size_t channels, std::size_t frames);
+  void write_motion();
+  void publish_motion();
 
   double rate_hz_;
   bool limit_;
@@ -240,9 +240,9 @@ struct Process {
   std::int64_t frame_ = 0;  // of the next sample
   std::uint64_t order_ = 0;
   MidiReader midi_;
-  Sounding* current_ = nullptr;
-  Sounding* fading_ = nullptr;
-  Sounding* waiting_ = nullptr;  // follows when the ringing engine has faded out
+  PlayingEngine* current_ = nullptr;
+  PlayingEngine* fading_ = nullptr;
+  PlayingEngine* waiting_ = nullptr;  // follows when the ringing engine has faded out
   std::size_t fade_left_ = 0;
   bool rings_ = false;            // `fading_` rings on and does not fade yet
   std::int64_t rings_until_ = 0;  // frame
@@ -278,10 +278,10 @@ struct Process {
   std::vector<double> mixed_;       // [output][chunk_frames]
   // Ring of the latest output, filled while somebody watches the motion.
   std::array<float, MotionFrame::heard_samples> heard_{};
-  std::size_t heard_at_ = 0;        // position of the next sample
-  std::int64_t looked_until_ = 0;   // frame
-  Sounding* strobed_ = nullptr;     // engine that was asked for a stroboscope frame
-  std::int64_t strobed_until_ = 0;  // frame
+  std::size_t heard_at_ = 0;          // position of the next sample
+  std::int64_t looked_until_ = 0;     // frame
+  PlayingEngine* strobed_ = nullptr;  // engine that was asked for a stroboscope frame
+  std::int64_t strobed_until_ = 0;    // frame
 };
 
 }  // namespace ressort::realtime

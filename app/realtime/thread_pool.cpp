@@ -146,7 +146,7 @@ class ThreadPool::Team final : public Crew {
   std::int64_t longest_ns_ = 0;   // longest own task of the last run
 };
 
-ThreadPool::ThreadPool(std::size_t count, const Board<ClockReading>* live)
+ThreadPool::ThreadPool(std::size_t count, const SeqLock<ClockReading>* live)
     : clock_(live), shown_(count) {
   for (std::size_t i = 1; i < count; ++i) {
     threads_.emplace_back([this, i] { serve(i); });

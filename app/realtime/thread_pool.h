@@ -15,7 +15,7 @@ class ThreadPool final : public Executor {
   // Makes a pool of `count` threads, at least 1, including the caller of Crew::run(). `live` is the
   // clock of the process that plays: helpers sleep from one of its periods to the next. Null:
   // rendering.
-  explicit ThreadPool(std::size_t count, const Board<ClockReading>* live = nullptr);
+  explicit ThreadPool(std::size_t count, const SeqLock<ClockReading>* live = nullptr);
   ~ThreadPool() override;
   std::size_t size() const override { return threads_.size() + 1; }
   bool is_live() const override { return clock_ != nullptr; }
@@ -30,10 +30,10 @@ class ThreadPool final : public Executor {
   void serve(std::size_t helper);
   std::int64_t next_period_ns(std::int64_t time_ns) const;
 
-  const Board<ClockReading>* const clock_;
-  Shown<Team> shown_;
-  Moment next_ns_;           // start of the next period that needs help
-  Moment period_ns_;         // 0: unknown
+  const SeqLock<ClockReading>* const clock_;
+  HazardPointer<Team> shown_;
+  AtomicTime next_ns_;       // start of the next period that needs help
+  AtomicTime period_ns_;     // 0: unknown
   std::int64_t frame_ = -1;  // of the newest period; only the thread that shows a team uses it
   Counter taken_over_;
   Flag ends_;

@@ -24,14 +24,14 @@ Finding in_preset(const Scene& scene, const Error& error) {
 
 }  // namespace
 
-bool Admission::is_granted() const {
+bool CompiledScene::is_accepted() const {
   return std::none_of(findings.begin(), findings.end(), [](const Finding& finding) {
     return finding.diagnostic.severity == Severity::error;
   });
 }
 
-Admission ask_to_play(const Scene& scene, const CompileOptions& options, bool is_strict) {
-  Admission admission;
+CompiledScene compile_to_play(const Scene& scene, const CompileOptions& options, bool is_strict) {
+  CompiledScene admission;
   auto compiled = compile_network(scene.network, scene.preset, options);
   if (!compiled) {
     // Preset errors were found while reading, so this one is in the model.
@@ -70,7 +70,7 @@ Admission ask_to_play(const Scene& scene, const CompileOptions& options, bool is
 
 Result<Compiled> admit(const Scene& scene, const CompileOptions& options,
                        std::vector<std::string>& warnings, bool is_strict) {
-  Admission admission = ask_to_play(scene, options, is_strict);
+  CompiledScene admission = compile_to_play(scene, options, is_strict);
   std::string errors;
   for (const Finding& finding : admission.findings) {
     if (finding.diagnostic.severity == Severity::error) {

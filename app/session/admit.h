@@ -11,10 +11,10 @@
 namespace ressort::session {
 
 // The result of compiling a scene.
-struct Admission {
+struct CompiledScene {
   std::optional<Compiled> compiled;  // set even if errors reject it; empty if compilation failed
   std::vector<Finding> findings;     // an error among them rejects the scene
-  bool is_granted() const;
+  bool is_accepted() const;
 };
 
 // Compiles a scene. Reports errors with file, line and column: compilation errors, and instability
@@ -22,7 +22,8 @@ struct Admission {
 // missing stability proofs. With `is_strict`, two warnings are errors: a bow too strong for the
 // step size, and an exceeded budget of pitch or decay, unless a better form may still be found.
 // [any thread but audio]
-Admission ask_to_play(const Scene& scene, const CompileOptions& options, bool is_strict = false);
+CompiledScene compile_to_play(const Scene& scene, const CompileOptions& options,
+                              bool is_strict = false);
 
 // The same, for callers that only need the compiled scene. Appends warnings to `warnings`; the
 // error's message has all errors, one a line.

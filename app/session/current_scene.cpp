@@ -160,8 +160,8 @@ LearnedControl CurrentScene::control_of(const std::string& target) const {
 }
 
 void CurrentScene::send_mapping(const LearnedRow& row, bool is_on) {
-  process_.lessons.push({static_cast<std::uint8_t>(row.controller),
-                         is_on ? control_of(row.target) : LearnedControl{}});
+  process_.mapping_changes.push({static_cast<std::uint8_t>(row.controller),
+                                 is_on ? control_of(row.target) : LearnedControl{}});
 }
 
 Result<Done> CurrentScene::learn(const std::string& target) {

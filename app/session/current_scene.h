@@ -96,7 +96,7 @@ class CurrentScene {
   void send_mapping(const LearnedRow& row, bool is_on);
 
   Process& process_;
-  mutable std::mutex mutex_;  // guards all below, and the writing side of process_.lessons
+  mutable std::mutex mutex_;  // guards all below, and the writing side of process_.mapping_changes
   std::shared_ptr<const Loaded> loaded_ = std::make_shared<Loaded>();
   std::vector<double> values_;  // [parameter]
   std::shared_ptr<const std::vector<SceneFile>> files_;

@@ -35,7 +35,7 @@ void EngineSupply::offer(std::unique_ptr<Engine> engine, const Network& network,
   newest_ = engine.get();
   made_of.number = ++count_;
   made_of.serial = serial_;
-  auto next = std::make_unique<Sounding>();
+  auto next = std::make_unique<PlayingEngine>();
   next->picture = picture_of ? picture_of(*engine, network) : 0;
   next->engine = std::move(engine);
   next->serial = serial_;

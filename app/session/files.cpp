@@ -184,7 +184,7 @@ Result<Done> write_text(const std::string& path, const std::string& text, Existi
   return written ? file->keep() : written;
 }
 
-int put_text(const std::string& path, const std::string& text, bool force) {
+int write_output(const std::string& path, const std::string& text, bool force) {
   const auto complain = [](const Error& error, int code) {
     std::fprintf(stderr, "%s\n", error.message.c_str());
     return code;

@@ -21,7 +21,7 @@ Result<std::string> read_bytes(const std::string& path, std::size_t max_bytes);
 Result<Done> write_text(const std::string& path, const std::string& text, Existing existing);
 
 // The same for a command's --output. Prints errors to stderr and returns the command's exit code.
-int put_text(const std::string& path, const std::string& text, bool force);
+int write_output(const std::string& path, const std::string& text, bool force);
 
 // The files that a name may refer to. A person at this machine can name any file. An OSC packet can
 // name only models and presets below the program's and the user's folders, after links and ".." are

@@ -5,9 +5,10 @@
 
 namespace ressort::session {
 
-LoadNews::LoadNews(std::string name, Tell tell) : name_(std::move(name)), tell_(std::move(tell)) {}
+LoadProgress::LoadProgress(std::string name, Tell tell)
+    : name_(std::move(name)), tell_(std::move(tell)) {}
 
-void LoadNews::at(std::string_view stage) {
+void LoadProgress::at(std::string_view stage) {
   const auto now = Clock::now();
   if (now < next_ || !tell_) {
     return;

@@ -12,10 +12,10 @@
 namespace ressort::session {
 
 // Reports the stage of a load after one second and then every two seconds. [one thread]
-class LoadNews {
+class LoadProgress {
  public:
   using Tell = std::function<void(const std::string&)>;
-  LoadNews(std::string name, Tell tell);
+  LoadProgress(std::string name, Tell tell);
 
   void at(std::string_view stage);
 

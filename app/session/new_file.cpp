@@ -138,7 +138,7 @@ Result<Done> NewFile::keep() {
   return Done{};
 }
 
-Result<Done> spare(const std::string& output, std::span<const std::string> read) {
+Result<Done> check_not_input(const std::string& output, std::span<const std::string> read) {
   for (const std::string& input : read) {
     std::error_code error;
     if (!input.empty() && fs::equivalent(output, input, error)) {

@@ -38,6 +38,6 @@ class NewFile {
 };
 
 // Fails if `output` is one of the files that were read, by any name. Ignores empty names.
-Result<Done> spare(const std::string& output, std::span<const std::string> read);
+Result<Done> check_not_input(const std::string& output, std::span<const std::string> read);
 
 }  // namespace ressort::session

@@ -21,7 +21,7 @@ void ProblemReports::add_overload(const Report& report) {
                                          " until the load falls"
                                    : "") +
                  "; to lower the load, use a longer period, " +
-                 ways_to_make_room(report.index, precision_));
+                 ways_to_lower_load(report.index, precision_));
 }
 
 void ProblemReports::add_lost_events(const Meters& now) {

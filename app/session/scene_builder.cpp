@@ -42,7 +42,7 @@ SceneBuilder::SceneBuilder(const SessionOptions& options, Tell tell, WorkQueue& 
       watch_(watch) {}
 
 Result<std::shared_ptr<const Loaded>> SceneBuilder::load(const LoadRequest& request) {
-  LoadNews news(request.name, tell_);
+  LoadProgress news(request.name, tell_);
   bool was_stopped = false;
   const Progress progress([&](std::string_view stage) {
     news.at(stage);
@@ -120,8 +120,8 @@ Result<std::shared_ptr<const Loaded>> SceneBuilder::play(const LoadRequest& requ
   }
   const bool is_improvable = may_gain(compiled->plan);
   if (!is_improvable) {  // else improve() warns
-    if (std::string warning = too_much(compiled->plan, compiled->instrument.voices, options.rate_hz,
-                                       options.precision);
+    if (std::string warning = overload_warning(compiled->plan, compiled->instrument.voices,
+                                               options.rate_hz, options.precision);
         !warning.empty()) {
       warnings.push_back(std::move(warning));
     }
@@ -187,8 +187,8 @@ void SceneBuilder::improve() {
     }
     return;
   }
-  const std::string overload = too_much(compiled->plan, compiled->instrument.voices,
-                                        source.options.rate_hz, source.options.precision);
+  const std::string overload = overload_warning(compiled->plan, compiled->instrument.voices,
+                                                source.options.rate_hz, source.options.precision);
   const auto broken = broken_promise(compiled->plan);
   current_.set_plan(std::move(compiled->plan));
   FlightEngine made_of = source.made_of;

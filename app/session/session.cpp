@@ -79,7 +79,7 @@ void Session::shape(std::vector<TimbreTarget> targets, ShapeAnswer answer) {
       [answer](const Error& error) { answer(error); }});
 }
 
-Status Session::status(Asker asker) {
+Status Session::status(MeterReader asker) {
   Status status;
   status.period_frames = process_.clock.read().period;
   const auto loaded = current();

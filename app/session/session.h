@@ -112,7 +112,7 @@ class Session {
   std::vector<std::string> tuning() const;
   void set_tuning(std::vector<std::string> paths);
 
-  Status status(Asker asker = Asker::console);
+  Status status(MeterReader asker = MeterReader::console);
   // Sets the description of the backend, or of what the program waits for.
   void set_backend(std::string description, bool runs);
 

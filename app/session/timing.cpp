@@ -80,7 +80,7 @@ void measure(Plan& plan, const Engine& engine, const CompileOptions& options, in
   }
 }
 
-std::string too_much(const Plan& plan, int voices, double rate_hz, Precision precision) {
+std::string overload_warning(const Plan& plan, int voices, double rate_hz, Precision precision) {
   double predicted_ns = 0.0;
   for (const Part& part : plan.parts) {
     predicted_ns += part.predicted_ns;
@@ -99,10 +99,10 @@ std::string too_much(const Plan& plan, int voices, double rate_hz, Precision pre
          (fitting > 0  ? ": " + std::to_string(fitting) + " fit"
           : voices > 1 ? ", one alone " + percent(each)
                        : "") +
-         "; to lower the load, use " + ways_to_make_room(fitting, precision);
+         "; to lower the load, use " + ways_to_lower_load(fitting, precision);
 }
 
-std::string ways_to_make_room(int voices, Precision precision) {
+std::string ways_to_lower_load(int voices, Precision precision) {
   std::vector<std::string> ways;
   if (voices > 0) {
     ways.push_back("-p " + std::to_string(voices));

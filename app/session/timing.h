@@ -14,9 +14,9 @@ void measure(Plan& plan, const Engine& engine, const CompileOptions& options, in
 
 // Returns a warning if one core is too slow for all voices with all contacts closed; empty if it is
 // fast enough. [any thread but audio]
-std::string too_much(const Plan& plan, int voices, double rate_hz, Precision precision);
+std::string overload_warning(const Plan& plan, int voices, double rate_hz, Precision precision);
 
 // Returns ways to lower the load: "-p 3, a lower rate, ...". `voices`: how many fit; 0: none.
-std::string ways_to_make_room(int voices, Precision precision);
+std::string ways_to_lower_load(int voices, Precision precision);
 
 }  // namespace ressort::session

@@ -259,7 +259,7 @@ Result<std::string> Worker::apply_edit(Draft draft) {
                             before->third == draft.scene.third &&
                             before->has_preset == draft.scene.has_preset;
   }
-  LoadNews news(name, tell_);
+  LoadProgress news(name, tell_);
   const Progress progress([&](std::string_view stage) {
     news.at(stage);
     return !queue_.has_newer_load();

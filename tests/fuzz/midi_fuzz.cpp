@@ -14,7 +14,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       compile_network(fuzz::network(), preset.preset, {.rate_hz = fuzz::Harness::rate_hz});
   require(static_cast<bool>(compiled));
   fuzz::Harness harness(*std::move(compiled));
-  MidiDoor door(harness.process);
+  MidiSink door(harness.process);
   MidiReader reader;
   std::vector<MidiPacket> packets;
   std::span<const std::uint8_t> rest(data, size);

@@ -63,7 +63,7 @@ class Harness {
   void offer(Compiled compiled) {
     instrument = std::move(compiled.instrument);
     delete process.slot.collect();
-    delete process.slot.offer(new Sounding{std::move(compiled.engine), serial});
+    delete process.slot.offer(new PlayingEngine{std::move(compiled.engine), serial});
   }
 
   void block(std::size_t frames, std::span<const MidiPacket> midi = {}) {

@@ -232,8 +232,8 @@ struct Show {
     auto made = compile_network(network, preset_of(network, false, 2),
                                 {.method = directly ? Method::direct : turn.method});
     REQUIRE(made);
-    const Sounding* const refused =
-        process.slot.offer(new Sounding{std::move(made->engine), ++serial});
+    const PlayingEngine* const refused =
+        process.slot.offer(new PlayingEngine{std::move(made->engine), ++serial});
     REQUIRE(refused == nullptr);
     for (Event event : gestures(network, serial)) {
       if (event.frame < frames) {
@@ -259,7 +259,7 @@ struct Show {
       process.block(inputs, outputs, frames, {}, 0);
       heap_calls += watch.calls();
     }
-    const std::unique_ptr<Sounding> old(process.slot.collect());
+    const std::unique_ptr<PlayingEngine> old(process.slot.collect());
   }
 };
 

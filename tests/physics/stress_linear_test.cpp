@@ -245,7 +245,7 @@ TEST_CASE("S25: NaN input samples are silent, and later samples are heard", "[st
                         {.bare = is_bare});
     REQUIRE(compiled);
     Process process(44100.0, false);
-    process.slot.offer(new Sounding{std::move(compiled->engine), 1});
+    process.slot.offer(new PlayingEngine{std::move(compiled->engine), 1});
     std::vector<float> input(256);
     std::vector<float> out(256);
     std::vector<float> all;

@@ -215,7 +215,7 @@ double resident_mb() {
 Found abuse(Compiled compiled, double seconds, std::uint64_t seed, bool force) {
   const Instrument instrument = compiled.instrument;
   Process process(rate_hz);
-  process.slot.offer(new Sounding{std::move(compiled.engine), serial});
+  process.slot.offer(new PlayingEngine{std::move(compiled.engine), serial});
   Abuser abuser(instrument, seed, force);
   Random lengths(seed + 1);
   const auto channels = static_cast<std::size_t>(std::max(2, instrument.outputs));

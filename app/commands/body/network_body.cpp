@@ -66,8 +66,8 @@ std::string ports_of(const ModalChain& chain) {
 }  // namespace
 
 int network_body(const NetworkBodyOptions& options) {
-  LoadNews news(options.input,
-                [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
+  LoadProgress news(options.input,
+                    [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
   const Progress progress([&](std::string_view stage) {
     news.at(stage);
     return true;  // Ctrl-C ends the process
@@ -77,7 +77,7 @@ int network_body(const NetworkBodyOptions& options) {
     return refuse(scene.error().message);
   }
   const std::string read[] = {scene->path, scene->model_path};
-  if (auto spared = spare(options.output, read); !spared) {
+  if (auto spared = check_not_input(options.output, read); !spared) {
     return refuse(spared.error().message);
   }
   const std::string place = options.chain.empty() ? "" : listen_at(scene->network, options.chain);
@@ -121,7 +121,7 @@ int network_body(const NetworkBodyOptions& options) {
     std::fputs(text.c_str(), stdout);
     return std::fflush(stdout) == 0 ? exit_code::done : exit_code::our_failure;
   }
-  if (const int code = put_text(options.output, text, options.force); code != exit_code::done) {
+  if (const int code = write_output(options.output, text, options.force); code != exit_code::done) {
     return code;
   }
   std::printf("%s: %s, %s\n", options.output.c_str(),

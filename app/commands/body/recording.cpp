@@ -73,7 +73,7 @@ Result<Identification> identify_recording(const std::string& path, const Identif
 int recording_body(const BodyOptions& options) {
   const std::string read[] = {options.input};
   for (const std::string& written : {options.output, options.picture}) {
-    if (auto spared = spare(written, read); !spared) {
+    if (auto spared = check_not_input(written, read); !spared) {
       return complain_of(spared.error().message);
     }
   }
@@ -84,7 +84,7 @@ int recording_body(const BodyOptions& options) {
   if (auto found = plot::check_gnuplot(); !options.picture.empty() && !found) {
     return complain_of(options.picture + ": " + found.error().message);
   }
-  LoadNews news(options.input,
+  LoadProgress news(options.input,
                 [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
   const Progress progress([&](std::string_view stage) {
     news.at(stage);
@@ -108,7 +108,7 @@ int recording_body(const BodyOptions& options) {
   const std::string label = label_of_file(options.output.empty() ? options.input : options.output);
   const std::string model = body_model(*found, label, source, options.mass);
   if (!options.output.empty()) {
-    if (const int code = put_text(options.output, model, options.force)) {
+    if (const int code = write_output(options.output, model, options.force)) {
       return code;
     }
   }

@@ -294,7 +294,7 @@ int solid_body(const SolidBodyOptions& options) {
   }
   for (const std::string& written : {options.output, options.picture}) {
     const std::string read[] = {options.input};
-    if (const auto spared = spare(written, read); !spared) {
+    if (const auto spared = check_not_input(written, read); !spared) {
       return complain(spared.error().message);
     }
   }
@@ -366,7 +366,7 @@ int solid_body(const SolidBodyOptions& options) {
       std::fwrite(text.data(), 1, text.size(), stdout);
       return exit_code::done;
     }
-    if (const int failure = put_text(options.output, text, options.force)) {
+    if (const int failure = write_output(options.output, text, options.force)) {
       return failure;
     }
     if (!options.is_quiet) {

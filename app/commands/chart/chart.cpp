@@ -177,7 +177,7 @@ int write_all(const ChartOptions& options, const std::vector<ChartSheet>& sheets
   const std::string made_by = provenance();
   const bool is_forced = true;
   if (const int code =
-          put_text((folder / "chart.csv").string(), chart_csv(sheets, made_by), is_forced)) {
+          write_output((folder / "chart.csv").string(), chart_csv(sheets, made_by), is_forced)) {
     return code;
   }
   std::printf("%s: %s\n", (folder / "chart.csv").c_str(),

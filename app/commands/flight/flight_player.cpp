@@ -124,7 +124,7 @@ Result<Done> FlightPlayer::play(const std::function<Result<Done>(std::span<const
       if (!engine) {
         return engine.error();
       }
-      auto sounding = std::make_unique<Sounding>();
+      auto sounding = std::make_unique<PlayingEngine>();
       sounding->engine = *std::move(engine);
       sounding->serial = made_of->serial;
       sounding->lets_ring = made_of->lets_ring;

@@ -16,7 +16,7 @@ Result<Rendered> render_flight(const RenderOptions& options,
     return player.error();
   }
   const std::string read[] = {options.name};
-  if (auto spared = spare(options.output, read); !spared) {
+  if (auto spared = check_not_input(options.output, read); !spared) {
     return spared.error();
   }
   Rendered rendered{.name = std::filesystem::path(options.name).stem().string(),

@@ -250,7 +250,7 @@ int gallery(const GalleryOptions& options, const GoesOn& goes_on) {
   const std::filesystem::path folder = options.folder;
   const bool is_forced = true;
   if (const int code =
-          put_text((folder / "index.html").string(), gallery_page(shown, made), is_forced)) {
+          write_output((folder / "index.html").string(), gallery_page(shown, made), is_forced)) {
     return code;
   }
   if (const int code =

@@ -80,7 +80,7 @@ int modes_command(const ModesOptions& options) {
   if (auto found = plot::check_gnuplot(); !options.output.empty() && !is_tuning && !found) {
     return refuse(options.output + ": " + found.error().message);
   }
-  LoadNews news(options.name,
+  LoadProgress news(options.name,
                 [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
   const Progress progress([&](std::string_view stage) {
     news.at(stage);
@@ -94,7 +94,7 @@ int modes_command(const ModesOptions& options) {
     std::fprintf(stderr, "%s\n", warning.c_str());
   }
   const std::string read[] = {scene->path, scene->model_path};
-  if (auto spared = spare(options.output, read); !spared) {
+  if (auto spared = check_not_input(options.output, read); !spared) {
     return refuse(spared.error().message);
   }
   const std::vector<double> parameters = start_values(*scene);
@@ -131,7 +131,7 @@ int modes_command(const ModesOptions& options) {
   }
   if (!options.output.empty()) {
     if (const int code =
-            is_tuning ? put_text(options.output, print_network(scene->network), options.force)
+            is_tuning ? write_output(options.output, print_network(scene->network), options.force)
                       : put_figure(options.output, figure, options.force)) {
       return code;
     }

@@ -65,13 +65,13 @@ class Player {
       song = *std::move(read);
       options_.midi = PlayOptions().midi;
     }
-    if (names_flight(options_.name)) {
+    if (is_flight_name(options_.name)) {
       return play_flight();
     }
     if (const int failure = join_manager(); failure != exit_code::done || has_called_off_) {
       return failure;
     }
-    LoadNews news(options_.name, [this](const std::string& text) { voice_.say(text); });
+    LoadProgress news(options_.name, [this](const std::string& text) { voice_.say(text); });
     const Progress progress([&](std::string_view stage) {
       news.at(stage);
       return !is_called_off(0ms);
@@ -253,7 +253,7 @@ class Player {
     options_.device.client_name = project.client_id;
     options_.device.wiring = Wiring();
     for (const Cable& cable : stage->cables) {
-      options_.device.wiring.expect(cable);
+      options_.device.wiring.add_missing(cable);
     }
     tuning_ = std::move(stage->tuning);
     if (!is_first) {
@@ -563,7 +563,7 @@ class Player {
   Process process_{48000.0, true, monotonic_ns};
   Announcer voice_;
   Flag quit_;
-  MidiDoor door_{process_};
+  MidiSink door_{process_};
   std::mutex device_mutex_;  // between main and the session's worker
   AudioDevice device_;
   std::string device_kind_;  // of the open device
@@ -588,7 +588,7 @@ class Player {
 
 int play(const PlayOptions& options) {
   const int code = Player(options).run();
-  static_cast<void>(wait_until_said());
+  static_cast<void>(flush_messages());
   return code;
 }
 

@@ -7,7 +7,7 @@
 
 namespace ressort::commands {
 
-MidiPlayer::MidiPlayer(MidiFile file, MidiDoor& door)
+MidiPlayer::MidiPlayer(MidiFile file, MidiSink& door)
     : file_(std::move(file)), door_(door), thread_([this] { work(); }) {}
 
 MidiPlayer::~MidiPlayer() {

@@ -13,7 +13,7 @@ namespace ressort::commands {
 class MidiPlayer {
  public:
   // Starts a thread that plays through `door`, which must outlive this object.
-  MidiPlayer(MidiFile file, MidiDoor& door);
+  MidiPlayer(MidiFile file, MidiSink& door);
   ~MidiPlayer();  // stops playing
   MidiPlayer(const MidiPlayer&) = delete;
   MidiPlayer& operator=(const MidiPlayer&) = delete;
@@ -25,7 +25,7 @@ class MidiPlayer {
   void work();
 
   MidiFile file_;
-  MidiDoor& door_;
+  MidiSink& door_;
   mutable std::mutex mutex_;  // guards the next three
   std::condition_variable wake_;
   bool must_end_ = false;

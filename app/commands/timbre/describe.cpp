@@ -137,7 +137,7 @@ Result<Description> describe_note(const DescribeOptions& options, const Progress
 
 Result<Description> describe_model(const DescribeOptions& options,
                                    const DescriptionProgress& progress, const Warn& warn) {
-  LoadNews news(options.name,
+  LoadProgress news(options.name,
                 [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
   const Progress loading([&](std::string_view stage) {
     news.at(stage);
@@ -217,7 +217,7 @@ int describe(const DescribeOptions& options, const std::function<bool()>& goes_o
       return refuse(output + ": " + found.error().message);
     }
     const std::string read[] = {options.name};
-    if (auto spared = spare(output, read); !spared) {
+    if (auto spared = check_not_input(output, read); !spared) {
       return refuse(spared.error().message);
     }
   }

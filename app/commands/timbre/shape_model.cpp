@@ -157,8 +157,8 @@ int shape_model(const ShapeOptions& options, const std::function<bool()>& goes_o
   if (!options.output.empty() && !options.output.ends_with(".toml")) {
     return refuse("-o: expected a file that ends in .toml, found '" + options.output + "'");
   }
-  LoadNews news(options.name,
-                [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
+  LoadProgress news(options.name,
+                    [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
   const Progress progress([&](std::string_view stage) {
     news.at(stage);
     return goes_on();
@@ -168,7 +168,7 @@ int shape_model(const ShapeOptions& options, const std::function<bool()>& goes_o
     return refuse(scene.error().message);
   }
   const std::string read[] = {scene->path, scene->model_path, options.like};
-  if (auto spared = spare(options.output, read); !spared) {
+  if (auto spared = check_not_input(options.output, read); !spared) {
     return refuse(spared.error().message);
   }
   std::optional<NewFile> output;  // opened before the search, which may be slow

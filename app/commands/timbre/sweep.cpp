@@ -227,7 +227,7 @@ int sweep(const DescribeOptions& options, const std::function<bool()>& goes_on) 
   const std::string csv = to_csv(table, options.swept);
   for (const std::string& output : options.outputs) {
     if (const int code = output.ends_with(".csv")
-                             ? put_text(output, csv, options.force)
+                             ? write_output(output, csv, options.force)
                              : put_figure(output, *sweep_figure(table, options), options.force)) {
       return code;
     }

@@ -146,7 +146,7 @@ void answer::flight(const Question& question) {
 }
 
 void answer::status(const Question& question) {
-  question.client.answer(status_reply(question.session.status(Asker::osc)));
+  question.client.answer(status_reply(question.session.status(MeterReader::osc)));
 }
 
 void answer::describe(const Question& question) {

@@ -64,7 +64,7 @@ inline constexpr std::size_t max_flight_bytes = std::size_t{256} << 20;
 inline constexpr double flight_heard_s = 30.0;  // the end is played, the rest only computed
 
 // Returns true for a flight's file name.
-bool names_flight(std::string_view name);
+bool is_flight_name(std::string_view name);
 
 // Reads an engine's scene from the flight's texts and compiles it. [any thread but audio]
 Result<std::unique_ptr<Engine>> make_flight_engine(const Flight& flight,

@@ -7,7 +7,7 @@
 
 namespace ressort::session {
 
-bool names_flight(std::string_view name) {
+bool is_flight_name(std::string_view name) {
   return name.ends_with(".ressort");
 }
 

@@ -25,8 +25,8 @@ constexpr std::size_t most_kept_bytes = std::size_t{64} << 20;
 constexpr double endless = std::numeric_limits<double>::infinity();
 
 // Returns the cache file for the modes of this network; empty without a cache folder.
-std::string place_of(const Scene& scene, const std::vector<double>& parameters,
-                     const ModeOptions& options) {
+std::string cache_path(const Scene& scene, const std::vector<double>& parameters,
+                       const ModeOptions& options) {
   const std::string folder = cache_folder();
   if (folder.empty()) {
     return "";
@@ -59,8 +59,8 @@ json json_of(const KnownModes& modes) {
 }
 
 // Returns nothing if the file is incomplete or not ours.
-std::optional<KnownModes> kept(const std::string& place, const ModeOptions& options) {
-  const auto text = read_text(place, most_kept_bytes);
+std::optional<KnownModes> read_cache(const std::string& path, const ModeOptions& options) {
+  const auto text = read_text(path, most_kept_bytes);
   if (!text) {
     return std::nullopt;
   }
@@ -90,10 +90,10 @@ std::optional<KnownModes> kept(const std::string& place, const ModeOptions& opti
   }
 }
 
-void keep(const std::string& place, const KnownModes& modes) {
+void write_cache(const std::string& path, const KnownModes& modes) {
   std::error_code error;
-  std::filesystem::create_directories(std::filesystem::path(place).parent_path(), error);
-  static_cast<void>(write_text(place, json_of(modes).dump(), Existing::replace));
+  std::filesystem::create_directories(std::filesystem::path(path).parent_path(), error);
+  static_cast<void>(write_text(path, json_of(modes).dump(), Existing::replace));
 }
 
 }  // namespace
@@ -141,9 +141,9 @@ KnownModes known_modes(const NetworkModes& found) {
 
 Result<KnownModes> known_modes(const Scene& scene, const std::vector<double>& parameters,
                                const ModeOptions& options) {
-  const std::string place = place_of(scene, parameters, options);
-  if (!place.empty()) {
-    if (auto modes = kept(place, options)) {
+  const std::string path = cache_path(scene, parameters, options);
+  if (!path.empty()) {
+    if (auto modes = read_cache(path, options)) {
       return *std::move(modes);
     }
   }
@@ -154,8 +154,8 @@ Result<KnownModes> known_modes(const Scene& scene, const std::vector<double>& pa
   }
   KnownModes modes = known_modes(*found);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-  if (!place.empty() && took.count() > worth_keeping_s) {
-    keep(place, modes);
+  if (!path.empty() && took.count() > worth_keeping_s) {
+    write_cache(path, modes);
   }
   return modes;
 }

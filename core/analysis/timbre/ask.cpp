@@ -34,11 +34,11 @@ constexpr double well_told = 0.25;
 
 using Place = std::vector<double>;  // [free parameter] 0 to 1.
 
-class Asker {
+class MeterReader {
  public:
-  Asker(const AskedModel& model, std::span<const double> values,
-        std::span<const FreeParameter> free, std::span<const TimbreTarget> targets,
-        const Progress& progress)
+  MeterReader(const AskedModel& model, std::span<const double> values,
+              std::span<const FreeParameter> free, std::span<const TimbreTarget> targets,
+              const Progress& progress)
       : model_(model),
         values_(values.begin(), values.end()),
         free_(free),
@@ -312,7 +312,7 @@ class Search {
 
   Result<AskedTimbre> run() {
     options_.progress.stage("looking for the timbre");
-    std::vector<Asker::Trial> far;
+    std::vector<MeterReader::Trial> far;
     int start = 0;
     for (; start < options_.starts && !is_there(); ++start) {
       tell(start);
@@ -363,13 +363,13 @@ class Search {
     });
   }
 
-  void keep(std::optional<Asker::Trial> end) {
+  void keep(std::optional<MeterReader::Trial> end) {
     if (end && (!best_ || end->cost() < best_->cost())) {
       best_ = std::move(end);
     }
   }
 
-  void bring_nearer(const Asker::Trial& end) {
+  void bring_nearer(const MeterReader::Trial& end) {
     if (!options_.exactly) {
       keep(end);
       return;
@@ -423,11 +423,11 @@ class Search {
 
   const AskOptions& options_;
   std::span<const FreeParameter> free_;
-  Asker asker_;
-  Asker judge_;
+  MeterReader asker_;
+  MeterReader judge_;
   std::mt19937_64 random_;
   std::vector<Place> ends_;  // End points of the smooth model.
-  std::optional<Asker::Trial> best_;
+  std::optional<MeterReader::Trial> best_;
   std::optional<Error> first_error_;
 };
 

@@ -9,15 +9,15 @@ namespace ressort::support {
 inline constexpr double rate = 44100.0;
 inline constexpr std::size_t fade_frames = 2205;  // 50 ms
 
-inline Sounding* sounding(const std::string& text, const Preset& preset, std::uint32_t serial) {
+inline PlayingEngine* sounding(const std::string& text, const Preset& preset, std::uint32_t serial) {
   // The direct form rounds alike for any division into blocks.
   auto compiled = compile_network(network_of(text), preset, {.method = Method::direct});
   REQUIRE(compiled);
-  return new Sounding{std::move(compiled->engine), serial};
+  return new PlayingEngine{std::move(compiled->engine), serial};
 }
 
 // A model with a constant output.
-inline Sounding* constant(const std::string& height, std::uint32_t serial = 1) {
+inline PlayingEngine* constant(const std::string& height, std::uint32_t serial = 1) {
   return sounding("@g ground " + height + "\n@out1 posOutput @g\n", Preset{}, serial);
 }
 

@@ -181,7 +181,7 @@ TEST_CASE("every event of a flood of MIDI that finds no room is counted", "[floo
   }
   Held harness;
   harness.out[0].clear();
-  MidiDoor door(harness.process);
+  MidiSink door(harness.process);
   MidiReader reader;
   for (std::size_t i = 0; i < Process::max_now + 700; ++i) {
     door.arrive(reader, on, 0);

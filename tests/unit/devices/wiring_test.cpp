@@ -17,7 +17,7 @@ using Ports = std::set<std::string>;
 
 void look(Wiring& wiring, const std::vector<Cable>& present, const Ports& ports,
           bool is_quiet = true) {
-  wiring.look(
+  wiring.update(
       present, [&](const std::string& port) { return ports.count(port) > 0; }, is_quiet);
 }
 
@@ -30,12 +30,12 @@ TEST_CASE("all cables are missing when the device is lost, until they are there 
   Wiring wiring;
   look(wiring, {speaker, mixer, keyboard}, all);
   CHECK(wiring.missing().empty());
-  wiring.lose_all();
+  wiring.mark_all_missing();
   CHECK(wiring.missing() == std::vector<Cable>{speaker, mixer, keyboard});
   look(wiring, {}, {});
   look(wiring, {speaker}, {speaker.theirs});
   CHECK(wiring.missing() == std::vector<Cable>{mixer, keyboard});
-  wiring.lose_all();  // once more, before all had come
+  wiring.mark_all_missing();  // once more, before all had come
   CHECK(wiring.missing() == std::vector<Cable>{speaker, mixer, keyboard});
 }
 
@@ -46,12 +46,12 @@ TEST_CASE("what a person pulled stays pulled, until it is plugged in again", "[w
   CHECK(wiring.is_in_doubt());
   look(wiring, {speaker}, all);
   CHECK_FALSE(wiring.is_in_doubt());
-  wiring.lose_all();
+  wiring.mark_all_missing();
   CHECK(wiring.missing() == std::vector<Cable>{speaker});
   CHECK(wiring.knows(mixer));  // so that nobody plugs it in by himself
   CHECK_FALSE(wiring.knows(keyboard));
   look(wiring, {speaker, mixer}, all);
-  wiring.lose_all();
+  wiring.mark_all_missing();
   CHECK(wiring.missing() == std::vector<Cable>{speaker, mixer});
 }
 
@@ -72,7 +72,7 @@ TEST_CASE("a client that leaves takes its cables first, and does not pull them",
 TEST_CASE("a port that has gone and come back between two looks was not pulled", "[wiring]") {
   Wiring wiring;
   look(wiring, {speaker, mixer, keyboard}, all);
-  wiring.lose(keyboard.theirs);
+  wiring.mark_missing(keyboard.theirs);
   look(wiring, {speaker}, all);  // it is back, and the mixer was pulled meanwhile
   CHECK(wiring.missing() == std::vector<Cable>{keyboard});
   CHECK(wiring.is_in_doubt());
@@ -82,10 +82,10 @@ TEST_CASE("a port that has gone and come back between two looks was not pulled",
   CHECK(wiring.missing().empty());
   // Told of only after it was seen to be unplugged.
   look(wiring, {speaker}, all);
-  wiring.lose(keyboard.theirs);
+  wiring.mark_missing(keyboard.theirs);
   look(wiring, {speaker}, all);
   CHECK(wiring.missing() == std::vector<Cable>{keyboard});
-  wiring.lose(mixer.theirs);  // which a person has pulled
+  wiring.mark_missing(mixer.theirs);  // which a person has pulled
   CHECK(wiring.missing() == std::vector<Cable>{keyboard});
 }
 

@@ -157,7 +157,7 @@ TEST_CASE("A large mesh sounds at once, and by its modes when they are found", "
                                   {.rate_hz = 48000.0, .most_modes = quick_modes});
   REQUIRE(compiled);
   Process stays(48000.0);
-  stays.slot.offer(new Sounding{std::move(compiled->engine), 1});
+  stays.slot.offer(new PlayingEngine{std::move(compiled->engine), 1});
 
   support::Comparison comparison;
   const auto play = [&](std::size_t blocks) {

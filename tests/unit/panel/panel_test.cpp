@@ -215,7 +215,7 @@ TEST_CASE("viewing changes no bit of the sound and allocates nothing", "[panel]"
       auto compiled = compile_network(network_of(text), struck(4), {.method = method});
       REQUIRE(compiled);
       const Picture picture = make_picture(*compiled->engine, network_of(text), 3);
-      delete harness->process.slot.offer(new Sounding{
+      delete harness->process.slot.offer(new PlayingEngine{
           .engine = std::move(compiled->engine), .serial = 1, .picture = picture.number});
       for (int i = 0; i < 400; ++i) {
         if (i % 40 == 0) {
@@ -259,7 +259,7 @@ TEST_CASE("slow motion is stroboscopic at the sounding pitch", "[panel]") {
     auto compiled = compile_network(network_of(text), struck(2), {});
     REQUIRE(compiled);
     const Picture picture = make_picture(*compiled->engine, network_of(text), 1);
-    delete harness.process.slot.offer(new Sounding{
+    delete harness.process.slot.offer(new PlayingEngine{
         .engine = std::move(compiled->engine), .serial = 1, .picture = picture.number});
     harness.now(note_on(0, key));
     const double hz = 440.0 * std::exp2((key - 69) / 12.0);

@@ -85,7 +85,7 @@ std::atomic<int> Stalls::count{0};
 std::atomic<int> Stalls::pause_us{1};
 
 // A chord, a bend, parameters on their way, keys up, another chord: in periods of every length.
-std::vector<double> played(Engine& engine, Board<ClockReading>& clock, std::size_t frames,
+std::vector<double> played(Engine& engine, SeqLock<ClockReading>& clock, std::size_t frames,
                            int period) {
   const DenormalsFlushed flushed;
   support::Random random(3);
@@ -178,7 +178,7 @@ struct GatedCrew {
     REQUIRE(second.inside == 1);
   }
 
-  Board<ClockReading> clock;
+  SeqLock<ClockReading> clock;
   ThreadPool pool{2, &clock};
   Gated first;
   Gated second;
@@ -320,7 +320,7 @@ TEST_CASE("helpers play the bits of one thread, whatever stops them", "[helpers]
   };
   std::uint64_t taken_over = 0;
   for (const Case& scene : cases) {
-    Board<ClockReading> clock;
+    SeqLock<ClockReading> clock;
     for (const int period : {0, 16, 8192}) {
       const auto alone = engine_of(scene.preset, nullptr, scene.method);
       const std::vector<double> expected = played(*alone, clock, scene.frames, period);
@@ -355,7 +355,7 @@ TEST_CASE("The memory of what helpers work in is known before it is taken", "[he
   if (!support::heap_is_counted) {
     return;
   }
-  Board<ClockReading> clock;
+  SeqLock<ClockReading> clock;
   ThreadPool pool{2, &clock};
   for (Executor* const executor :
        {static_cast<Executor*>(nullptr), static_cast<Executor*>(&pool)}) {
@@ -396,7 +396,7 @@ TEST_CASE("a large network's shards are played by helpers to the bit", "[helpers
     REQUIRE(compiled);
     return std::move(compiled->engine);
   };
-  Board<ClockReading> clock;
+  SeqLock<ClockReading> clock;
   const std::vector<double> expected = played(*made(nullptr), clock, 3000, 0);
   CHECK(*std::max_element(expected.begin(), expected.end()) > 1e-3);
   for (const std::size_t threads : {2u, 3u}) {

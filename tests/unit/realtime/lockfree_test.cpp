@@ -229,7 +229,7 @@ TEST_CASE("a counter misses nothing that two threads add", "[lockfree]") {
 }
 
 TEST_CASE("a clock board is never read half written", "[lockfree]") {
-  Board<ClockReading> board;
+  SeqLock<ClockReading> board;
   CHECK(board.read().rate_hz == 0.0);
   std::atomic<bool> done{false};
   std::thread writer([&] {

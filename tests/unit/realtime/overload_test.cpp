@@ -46,7 +46,7 @@ struct Harness {
     auto compiled =
         compile_network(network_of(ringing_string()), struck(keys), {.method = Method::direct});
     REQUIRE(compiled);
-    delete process.slot.offer(new Sounding{std::move(compiled->engine), serial});
+    delete process.slot.offer(new PlayingEngine{std::move(compiled->engine), serial});
   }
   void strike_all() {
     for (int key = first_key; key < first_key + keys; ++key) {
@@ -312,23 +312,23 @@ TEST_CASE("a plan that one core has no time for says how many voices fit", "[ove
     made.parts.push_back({.predicted_ns = 0.75 * share * 1e9 / 48000.0});
     return made;
   };
-  CHECK(too_much(plan(1.75), 64, 48000.0, Precision::float64) ==
+  CHECK(overload_warning(plan(1.75), 64, 48000.0, Precision::float64) ==
         "all 64 voices would take about 175 % of one core: 32 fit; to lower the load, use -p 32, a "
         "lower "
         "rate, --precision float");
-  CHECK(too_much(plan(1.75), 64, 48000.0, Precision::float32) ==
+  CHECK(overload_warning(plan(1.75), 64, 48000.0, Precision::float32) ==
         "all 64 voices would take about 175 % of one core: 32 fit; to lower the load, use -p 32, a "
         "lower "
         "rate");
   CHECK(
-      too_much(plan(2.4), 1, 48000.0, Precision::float64) ==
+      overload_warning(plan(2.4), 1, 48000.0, Precision::float64) ==
       "its one voice would take about 240 % of one core; to lower the load, use a smaller model, a "
       "lower rate, --precision float");
-  CHECK(too_much(plan(2.4), 2, 48000.0, Precision::float32) ==
+  CHECK(overload_warning(plan(2.4), 2, 48000.0, Precision::float32) ==
         "all 2 voices would take about 240 % of one core, one alone about 120 % of one core; what "
         "makes room: a smaller model, a lower rate");
-  CHECK(too_much(plan(0.89), 64, 48000.0, Precision::float64).empty());
-  CHECK_FALSE(too_much(plan(0.89), 64, 96000.0, Precision::float64).empty());
+  CHECK(overload_warning(plan(0.89), 64, 48000.0, Precision::float64).empty());
+  CHECK_FALSE(overload_warning(plan(0.89), 64, 96000.0, Precision::float64).empty());
 }
 
 TEST_CASE("a session warns of a plan that is too much, and tells of an overload", "[overload]") {
@@ -368,10 +368,10 @@ TEST_CASE("a session warns of a plan that is too much, and tells of an overload"
     CHECK(now.cpu_peak == 1.5);
     CHECK(now.peak_db == Approx(20.0 * std::log10(0.5)));
     // Who asks next sees the same peak, once; who has asked sees none.
-    CHECK(session.status(Asker::panel).cpu_peak == 1.5);
-    CHECK(session.status(Asker::panel).cpu_peak == 0.0);
-    CHECK(session.status(Asker::console).cpu_peak == 0.0);
-    CHECK(session.status(Asker::osc).peak == 0.5);
+    CHECK(session.status(MeterReader::panel).cpu_peak == 1.5);
+    CHECK(session.status(MeterReader::panel).cpu_peak == 0.0);
+    CHECK(session.status(MeterReader::console).cpu_peak == 0.0);
+    CHECK(session.status(MeterReader::osc).peak == 0.5);
     session.set_backend("none; waiting for a device", false);
     CHECK(session.status().cpu == -1.0);
 

@@ -206,8 +206,8 @@ TEST_CASE("a thousand models change under sounding notes without a step", "[proc
   double before = 0.0;
   bool finite = true;
   for (std::uint32_t i = 0; i < 1000; ++i) {
-    Sounding* const next = sounding(texts[i % 2], struck(2), i + 1);
-    Sounding* const refused = harness.process.slot.offer(next);
+    PlayingEngine* const next = sounding(texts[i % 2], struck(2), i + 1);
+    PlayingEngine* const refused = harness.process.slot.offer(next);
     REQUIRE(refused == nullptr);
     const auto start = static_cast<std::int64_t>(harness.played);
     for (const Event& note : {note_on(0, 57), note_on(900, 64)}) {
@@ -220,7 +220,7 @@ TEST_CASE("a thousand models change under sounding notes without a step", "[proc
       before = y;
       finite = finite && std::isfinite(y);
     }
-    if (Sounding* const old = harness.process.slot.collect()) {
+    if (PlayingEngine* const old = harness.process.slot.collect()) {
       returned.insert(old->serial);
       ++collected;
       delete old;
@@ -238,10 +238,10 @@ TEST_CASE("a thousand models change under sounding notes without a step", "[proc
 
 TEST_CASE("an offer that comes too soon waits, and one that is replaced comes back", "[process]") {
   Harness harness;
-  Sounding* const first = constant("1.", 1);
-  Sounding* const second = constant("2.", 2);
-  Sounding* const third = constant("3.", 3);
-  Sounding* const fourth = constant("4.", 4);
+  PlayingEngine* const first = constant("1.", 1);
+  PlayingEngine* const second = constant("2.", 2);
+  PlayingEngine* const third = constant("3.", 3);
+  PlayingEngine* const fourth = constant("4.", 4);
   harness.process.slot.offer(first);
   harness.run(256);
   CHECK(harness.process.slot.offer(second) == nullptr);

@@ -128,10 +128,10 @@ TEST_CASE("what is read is known under every name", "[files]") {
   fs::create_directory(folder.file("sub"));
   for (const char* name : {"in.wav", "./in.wav", "sub/../in.wav", "soft.wav", "hard.wav"}) {
     INFO(name);
-    CHECK(has(error_of(spare(folder.file(name), read)), "cannot be the output"));
+    CHECK(has(error_of(check_not_input(folder.file(name), read)), "cannot be the output"));
   }
-  CHECK(spare(folder.file("out.wav"), read));
-  CHECK(spare(folder.write("same_text.wav", "x"), read));
+  CHECK(check_not_input(folder.file("out.wav"), read));
+  CHECK(check_not_input(folder.write("same_text.wav", "x"), read));
 }
 
 TEST_CASE("a text that finds no room leaves what was there", "[files]") {

@@ -107,7 +107,7 @@ TEST_CASE("what rings goes on as if nothing had been loaded, until the next but 
     std::uint32_t serial = 1;
     for (const std::size_t at : swaps) {
       play(harness, at - harness.y().size());
-      Sounding* const next = sounding(ringing_string(), struck(2), ++serial);
+      PlayingEngine* const next = sounding(ringing_string(), struck(2), ++serial);
       next->lets_ring = lets_ring;
       delete harness.process.slot.offer(next);
     }
@@ -134,7 +134,7 @@ TEST_CASE("a note that is held ends by its key in the model that it began in", "
   support::Harness harness;
   harness.process.slot.offer(sounding(hand_text, holding(), 1));
   play(harness, 2560, {0x90, 60, 127});
-  Sounding* const next = sounding(hand_text, holding(), 2);
+  PlayingEngine* const next = sounding(hand_text, holding(), 2);
   next->lets_ring = true;
   harness.process.slot.offer(next);
   play(harness, 25600);
