@@ -349,8 +349,9 @@ Result<Shaped> Worker::shape(const std::vector<TimbreTarget>& targets) {
       events.push_back(parameter_event(*now.loaded, i, shaped->found.values[i]));
     }
   }
-  return send(events) ? std::move(shaped)
-                      : Result<Shaped>(Error{"the audio thread is busy; try again"});
+  return send(events)
+             ? std::move(shaped)
+             : Result<Shaped>(Error{"the audio thread is busy and accepted no events; try again"});
 }
 
 Result<Done> Worker::retune(std::vector<Setting> values, const Progress& progress) {

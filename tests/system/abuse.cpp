@@ -1,10 +1,9 @@
-// What nobody would do to an instrument, for as long as one likes: ressort_abuse SECONDS [SEED
-// [NAME...]]. Every parameter over its whole range and beyond, at audio rate, once where the
-// program keeps it stable and once where it is forced to do as it is told; strikes, forces and
-// hands of any size; keys, bends and controllers at random; audio inputs with noise, and with what
-// is no number. Not one sample of what comes out may be non-finite or above the limiter's ceiling;
-// memory stays where it is; and once hands, pedals and levers are where they were, all notes end.
-// The random numbers are printed by their seed, so that what was found can be found again.
+// Abuses instruments for any time: ressort_abuse SECONDS [SEED [NAME...]]. Sweeps every parameter
+// over its whole range and beyond at audio rate, once within the stable range and once forced;
+// strikes, forces and hands of any size; random keys, bends and controllers; audio inputs with
+// noise, NaN and infinity. Every output sample must be finite and below the limiter's ceiling,
+// memory must not grow, and all notes must end once hands, pedals and levers are released. The seed
+// of the random numbers is printed, to reproduce a failure.
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -37,7 +36,7 @@ class Abuser {
   Abuser(const Instrument& instrument, std::uint64_t seed, bool force)
       : instrument_(instrument), random_(seed), one_in_is_beyond_(force ? 3 : 50) {}
 
-  // A few events for a block; at times none at all, so that something can fade away.
+  // Makes a few events for a block, and sometimes none at all, so that sounds can fade.
   std::vector<Event> events(std::size_t frames) {
     if (chance(400)) {
       calm_blocks_ = random_.below(300);
@@ -61,7 +60,7 @@ class Abuser {
     return events;
   }
 
-  // Hands, keys, pedals, levers and parameters back to where they were.
+  // Returns hands, keys, pedals, levers and parameters to their start.
   std::vector<Event> end() const {
     std::vector<Event> events;
     for (std::size_t i = 0; i < instrument_.parameters.size(); ++i) {
@@ -94,7 +93,7 @@ class Abuser {
     return events;
   }
 
-  // One channel of noise, with what is no number in it.
+  // Fills one channel with noise that contains NaN and infinity.
   void fill(std::vector<double>& samples) {
     static constexpr double nothings[] = {std::numeric_limits<double>::quiet_NaN(),
                                           std::numeric_limits<double>::infinity(), -1e300, 1e38};
@@ -106,7 +105,7 @@ class Abuser {
   }
 
  private:
-  // A parameter, sample by sample, from anywhere to anywhere.
+  // Sweeps a parameter sample by sample between random values.
   void sweep(std::vector<Event>& events, std::size_t frames) {
     const std::size_t index = random_.below(instrument_.parameters.size());
     for (std::uint32_t n = 0; n < frames; ++n) {
@@ -118,7 +117,7 @@ class Abuser {
   }
 
   bool chance(std::size_t one_in) { return random_.below(one_in) == 0; }
-  // Of either sign, from a millionth to a million.
+  // Returns a number of either sign with a magnitude from 1e-6 to 1e6.
   double any_size() {
     return (chance(2) ? 1.0 : -1.0) * std::pow(10.0, random_.uniform(-6.0, 6.0));
   }
@@ -198,8 +197,8 @@ struct Found {
   std::uint64_t wrong = 0;  // samples
   double peak = 0.0;
   std::uint64_t runaways = 0;
-  double grown_mb = 0.0;  // resident, since the first tenth
-  double ended_s = 0.0;   // after the last event; infinite: something sounds for ever
+  double grown_mb = 0.0;  // resident memory, since the first tenth of the time
+  double ended_s = 0.0;   // after the last event; infinite: a sound never ends
 };
 
 constexpr double longest_ring_s = 300.0;
@@ -239,7 +238,7 @@ Found abuse(Compiled compiled, double seconds, std::uint64_t seed, bool force) {
                   {}, 0);
     for (const std::vector<double>& channel : out) {
       for (const double sample : channel) {
-        found.wrong += std::fabs(sample) <= Limiter::ceiling ? 0 : 1;  // nor is NaN
+        found.wrong += std::fabs(sample) <= Limiter::ceiling ? 0 : 1;  // NaN is not either
         found.peak = std::max(found.peak, std::fabs(sample));
       }
     }
@@ -313,7 +312,7 @@ int main(int argc, char** argv) {
           found.peak, static_cast<unsigned long long>(found.runaways),
           static_cast<unsigned long long>(found.wrong), found.grown_mb, found.ended_s);
       std::fflush(stdout);
-      // What was forced may be anything by now.
+      // A forced scene may have any state by now.
       failures +=
           found.wrong > 0 || found.grown_mb > 4.0 || (!force && std::isinf(found.ended_s)) ? 1 : 0;
     }

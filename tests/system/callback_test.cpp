@@ -1,4 +1,5 @@
-// What the callback may never do, counted by a spy in the running program.
+// Operations that are forbidden in the callback, counted by an interposed library in the running
+// program.
 #include <netinet/in.h>
 #include <sys/socket.h>
 
@@ -12,7 +13,7 @@ namespace ressort::servers::callback_test {
 
 namespace {
 
-// Looks at the panel's motion for as long as it lives, sixty times a second.
+// Watches the panel's motion sixty times a second while it lives.
 class Viewer {
  public:
   explicit Viewer(std::uint16_t port) : socket_(socket(AF_INET, SOCK_STREAM, 0)) {
@@ -47,7 +48,7 @@ class Viewer {
 
 }  // namespace
 
-TEST_CASE("The callback allocates, locks, reads, writes and waits never", "[callback]") {
+TEST_CASE("The callback never allocates, locks, reads, writes or waits", "[callback]") {
   const std::string report = "/tmp/ressort-spy-" + std::to_string(getpid());
   const auto counts = [&] {
     std::map<std::string, unsigned long> found;
@@ -61,7 +62,7 @@ TEST_CASE("The callback allocates, locks, reads, writes and waits never", "[call
   };
   const Server server(256);
 
-  SECTION("the spy sees what is there to see") {
+  SECTION("the interposed library counts a provoked allocation") {
     {
       Child play(program({"play", "PolyTriangle", "-a", "jack", "-i", "-u", osc_port}),
                  {{"LD_PRELOAD", RESSORT_SPY}, {"RTSPY_OUT", report}, {"RTSPY_PROVOKE", "1"}});
@@ -76,7 +77,7 @@ TEST_CASE("The callback allocates, locks, reads, writes and waits never", "[call
     CHECK(found["releases"] >= found["callbacks"]);
   }
 
-  SECTION("notes, controllers, floods, sweeps and swaps, while four watch") {
+  SECTION("notes, controllers, floods, sweeps and swaps with four viewers") {
     const char* const asked = std::getenv("RESSORT_CALLBACK_SECONDS");
     const std::size_t frames =
         48000 * static_cast<std::size_t>(asked != nullptr ? atoi(asked) : 15);
@@ -110,7 +111,7 @@ TEST_CASE("The callback allocates, locks, reads, writes and waits never", "[call
       listener.plan(messages);
       listener.start("ressort:out_left", "ressort:midi_in");
       const auto most_rounds =
-          static_cast<int>(frames / 1920);  // one that is too busy drops its listener for good
+          static_cast<int>(frames / 1920);  // a busy program may drop its listener for good
       for (int round = 0; listener.frames() < frames && round < most_rounds; ++round) {
         for (int i = 0; i < 200; ++i) {
           lo_send(osc(), "/param/*", "f", 0.05f + 0.0005f * static_cast<float>(i));
@@ -142,7 +143,7 @@ TEST_CASE("The callback allocates, locks, reads, writes and waits never", "[call
   }
 }
 
-TEST_CASE("Helpers cost the callback no call", "[callback]") {
+TEST_CASE("Helpers add no system call to the callback", "[callback]") {
   const std::string report = "/tmp/ressort_spy_helpers_" + std::to_string(getpid());
   const Server server(256);
   {

@@ -1,4 +1,4 @@
-// Cables, ports and servers that come and go while the program plays.
+// Connections, ports and servers that come and go while the program plays.
 #include <jack/metadata.h>
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 
 namespace ressort::servers::connections_test {
 
-TEST_CASE("A keyboard that was unplugged is taken up again by its name", "[jack_midi]") {
+TEST_CASE("An unplugged keyboard is reconnected by its name", "[jack_midi]") {
   const Server server(256);
   Child play(program({"play", click(), "-a", "jack", "-i", "-u", osc_port}));
   REQUIRE(answers());
@@ -26,12 +26,12 @@ TEST_CASE("A keyboard that was unplugged is taken up again by its name", "[jack_
       }
       std::this_thread::sleep_for(1500ms);
     }
-    std::this_thread::sleep_for(1500ms);  // as long as a plug takes to be put in again
+    std::this_thread::sleep_for(1500ms);  // longer than a reconnection takes
   }
 }
 
-// Between two looks it is gone and there again, which is not the same as being unplugged by hand.
-TEST_CASE("A keyboard that is back in no time is taken up again as well", "[jack_midi]") {
+// Between two updates it goes and comes back, which differs from being unplugged by hand.
+TEST_CASE("A keyboard that returns at once is reconnected too", "[jack_midi]") {
   const Server server(256);
   Child play(program({"play", click(), "-a", "jack", "-i", "-u", osc_port}));
   REQUIRE(answers());
@@ -39,7 +39,7 @@ TEST_CASE("A keyboard that is back in no time is taken up again as well", "[jack
   REQUIRE(keyboard->connect("neighbour:keys", "ressort:midi_in"));
   for (int time = 0; time < 4; ++time) {
     INFO("time " << time);
-    std::this_thread::sleep_for(std::chrono::milliseconds(1500 + 17 * time));  // it is seen
+    std::this_thread::sleep_for(std::chrono::milliseconds(1500 + 17 * time));  // it is noticed
     keyboard.reset();
     keyboard = std::make_unique<Neighbour>();
     REQUIRE(
@@ -51,7 +51,7 @@ TEST_CASE("A keyboard that is back in no time is taken up again as well", "[jack
   CHECK_FALSE(keyboard->is_connected("neighbour:keys", "ressort:midi_in"));
 }
 
-TEST_CASE("Ports say what they are, in their order", "[jack_midi]") {
+TEST_CASE("Ports have names and an order", "[jack_midi]") {
   const Server server(256);
   Child play(program({"play", "Resonator", "-a", "jack", "-i", "-u", osc_port}));
   REQUIRE(answers());
@@ -76,10 +76,11 @@ TEST_CASE("Ports say what they are, in their order", "[jack_midi]") {
   jack_client_close(client);
 }
 
-TEST_CASE("The death of the server is survived, or told by the exit code", "[server_loss]") {
+TEST_CASE("The program survives the end of its server, or reports it by the exit code",
+          "[server_loss]") {
   auto server = std::make_unique<Server>(256);
 
-  SECTION("waits, and plays again on the next server") {
+  SECTION("it waits and continues on the next server") {
     Child play(program({"play", "PolyTriangle", "-a", "jack", "-i", "-u", osc_port}));
     REQUIRE(answers());
     server->kill();
@@ -96,7 +97,7 @@ TEST_CASE("The death of the server is survived, or told by the exit code", "[ser
     CHECK(play.exit_code() == 0);
   }
 
-  SECTION("what a person has connected is connected again, on servers of any kind") {
+  SECTION("connections made by hand are restored on servers of any kind") {
     using Cable = std::pair<std::string, std::string>;
     const std::vector<Cable> kept{{"ressort:out_left", "neighbour:left"},
                                   {"ressort:out_right", "neighbour:left"},
@@ -105,7 +106,7 @@ TEST_CASE("The death of the server is survived, or told by the exit code", "[ser
                                   {"neighbour:sound", "ressort:in_1"}};
     const Cable pulled{"ressort:out_left", "neighbour:right"};
     const Cable pulled_from_speaker{"ressort:out_left", "system:playback_1"};
-    // -j connects the speakers by itself, and has to respect what was pulled.
+    // -j connects the speakers, and must respect removed connections.
     Child play(program({"play", "Resonator", "-a", "jack", "-j", "-u", osc_port}));
     REQUIRE(answers());
     auto neighbour = std::make_unique<Neighbour>();
@@ -121,10 +122,10 @@ TEST_CASE("The death of the server is survived, or told by the exit code", "[ser
     REQUIRE(eventually([&] {
       return neighbour->is_connected(pulled_from_speaker.first, pulled_from_speaker.second);
     }));
-    std::this_thread::sleep_for(500ms);  // seen
+    std::this_thread::sleep_for(500ms);  // noticed
     neighbour->disconnect(pulled.first, pulled.second);
     neighbour->disconnect(pulled_from_speaker.first, pulled_from_speaker.second);
-    std::this_thread::sleep_for(1s);  // judged: it was no client that leaves
+    std::this_thread::sleep_for(1s);  // judged: not a closing client
 
     struct Next {
       int period_frames;
@@ -132,7 +133,7 @@ TEST_CASE("The death of the server is survived, or told by the exit code", "[ser
       bool is_killed;
     };
     std::vector<Next> nexts{{512, 48000, true}, {128, 44100, false}};
-    // More of them by RESSORT_KILLS, at all rates and periods in turn.
+    // RESSORT_KILLS adds servers with all rates and periods in turn.
     const char* const kills = std::getenv("RESSORT_KILLS");
     for (int i = 0; kills != nullptr && i < std::atoi(kills); ++i) {
       constexpr int periods[] = {64, 1024, 256, 128, 512};
@@ -150,13 +151,13 @@ TEST_CASE("The death of the server is survived, or told by the exit code", "[ser
       server.reset();
       server = std::make_unique<Server>(next.period_frames, next.rate_hz);
       REQUIRE(play.says("playing again"));
-      std::this_thread::sleep_for(300ms);  // it comes later than we
+      std::this_thread::sleep_for(300ms);  // the neighbour comes later than the program
       neighbour = std::make_unique<Neighbour>();
       const auto came = std::chrono::steady_clock::now();
       CHECK(eventually(all_are_back));
       const std::chrono::duration<double> took = std::chrono::steady_clock::now() - came;
       std::printf("all connections are back after %.2f s\n", took.count());
-      std::this_thread::sleep_for(1500ms);  // longer than anybody waits before he tries again
+      std::this_thread::sleep_for(1500ms);  // longer than the interval between attempts
       CHECK(all_are_back());
       CHECK_FALSE(neighbour->is_connected(pulled.first, pulled.second));
       CHECK_FALSE(neighbour->is_connected(pulled_from_speaker.first, pulled_from_speaker.second));

@@ -1,4 +1,4 @@
-// tests: a preset for any model at all, with controls of every kind on whatever it has.
+// tests: a preset for any model, with controls of every kind.
 #pragma once
 
 #include <array>
@@ -14,9 +14,8 @@
 
 namespace ressort::support {
 
-// Every input is driven by every source, with a gesture of its own from each; every parameter by
-// all sources that may turn one. Which source has which gesture, and all else that a preset says,
-// goes round with `turn`.
+// Every source drives every input with a gesture of its own, and all suitable sources control every
+// parameter. `turn` rotates the pairs of source and gesture and all other keys of the preset.
 class PresetWriter {
  public:
   PresetWriter(const Network& network, std::string model, std::size_t turn)
@@ -70,7 +69,7 @@ class PresetWriter {
              std::string(how) + "\"\nrange = " + range(reach) + "\n" + more;
   }
 
-  // The sources by turns; `nth` gives each controller, address and channel to one alone.
+  // Returns the sources in turn. `nth` gives each controller, address and channel to one control.
   static std::string source(std::size_t which, std::size_t nth) {
     switch (which) {
       case 0:

@@ -1,4 +1,5 @@
-// A session manager's side, spoken by hand: announce, open, save, switch, close, and all is back.
+// The protocol of a session manager: announce, open, save, switch, close, and everything is
+// restored.
 #include <lo/lo.h>
 
 #include <filesystem>
@@ -38,7 +39,7 @@ class Manager {
   std::string url() const {
     return "osc.udp://localhost:" + std::to_string(lo_server_get_port(server_)) + "/";
   }
-  // Until something of this address, and of this first text, has come; all that it says.
+  // Waits for a message with this address and first text. Returns all its texts.
   bool hears(const std::string& address, const std::string& first, std::string* all = nullptr) {
     return eventually([&] {
       lo_server_recv_noblock(server_, 20);
@@ -96,7 +97,7 @@ bool has_port(const std::string& name) {
 
 }  // namespace
 
-TEST_CASE("A session manager finds all of it again", "[nsm]") {
+TEST_CASE("A session manager restores everything", "[nsm]") {
   const Server server(256);
   const Folder folder;
   { std::ofstream(folder.file("two.scl")) << "two steps\n2\n600.\n2/1\n"; }
@@ -112,7 +113,7 @@ TEST_CASE("A session manager finds all of it again", "[nsm]") {
     std::string said;
     REQUIRE(manager.hears("/nsm/server/announce", "ressort", &said));
     CHECK(said == "ressort :switch:dirty: ressort 1 1 " + std::to_string(play->pid()));
-    // Nothing before the manager has said what; and then by its name.
+    // The program waits for the manager and uses its name.
     manager.welcome();
     std::this_thread::sleep_for(300ms);
     CHECK_FALSE(has_port("ressort:out_left"));
@@ -128,11 +129,11 @@ TEST_CASE("A session manager finds all of it again", "[nsm]") {
     play->write("load PolyTriangle\nset m_K 0.0625\ntuning \"" + folder.file("two.scl") + "\"\n");
     REQUIRE(play->says("m_K = 0.0625"));
     CHECK(manager.hears("/nsm/client/is_dirty", ""));
-    std::this_thread::sleep_for(1500ms);  // the cable is seen
+    std::this_thread::sleep_for(1500ms);  // the connection is noticed
     manager.save();
     REQUIRE(manager.hears("/reply", "/nsm/client/save"));
     CHECK(manager.hears("/nsm/client/is_clean", ""));
-    // Another project instead, under another name, and the first one's things are not there.
+    // Another project under another name does not contain the first one's things.
     manager.open(folder.file("second.nDEF"), "ressort.nDEF");
     REQUIRE(manager.hears("/reply", "/nsm/client/open"));
     CHECK_FALSE(has_port("ressort.nABC:out_left"));
@@ -142,7 +143,7 @@ TEST_CASE("A session manager finds all of it again", "[nsm]") {
     REQUIRE(play->says("m_K = 0.015"));
     std::this_thread::sleep_for(1500ms);
     CHECK_FALSE(neighbour.is_connected("ressort.nDEF:out_left", "neighbour:left"));
-    // And back, while it runs.
+    // Back to the first project while the program runs.
     manager.open(first, "ressort.nABC");
     REQUIRE(manager.hears("/reply", "/nsm/client/open"));
     play->forget();
@@ -155,7 +156,7 @@ TEST_CASE("A session manager finds all of it again", "[nsm]") {
   }
   CHECK(fs::exists(folder.path / "first.nABC" / "PolyTriangle.mdl"));
   CHECK(fs::exists(folder.path / "first.nABC" / "two.scl"));
-  fs::remove(folder.file("two.scl"));  // it has its own
+  fs::remove(folder.file("two.scl"));  // the project has its own copy
   Manager manager;
   auto play = start(manager);
   REQUIRE(manager.hears("/nsm/server/announce", "ressort"));
@@ -170,12 +171,12 @@ TEST_CASE("A session manager finds all of it again", "[nsm]") {
   play->write("get m_K\nstatus\n");
   REQUIRE(play->says("m_K = 0.0625"));
   REQUIRE(play->says("model   PolyTriangle"));
-  // Half an octave a key, from the middle C on: key 62 is C5, 523.25 Hz, not D4's 293.7.
+  // Half an octave per key from middle C: key 62 is C5, 523.25 Hz, instead of D4, 293.7 Hz.
   Listener listener(48000 * 3);
   listener.plan({{4800, {0x90, 62, 127}}});
   listener.start("ressort.nABC:out_left", "ressort.nABC:midi_in");
   REQUIRE(listener.wait_for(48000));
-  std::map<int, double> level;  // of a band around each
+  std::map<int, double> level;  // level of a band around each
   for (const int hz : {294, 523}) {
     double re = 0.0;
     double im = 0.0;
@@ -192,7 +193,7 @@ TEST_CASE("A session manager finds all of it again", "[nsm]") {
   CHECK(play->exit_code() == 0);
 }
 
-TEST_CASE("Without an answer it plays by itself", "[nsm]") {
+TEST_CASE("Without a session manager the program plays", "[nsm]") {
   const Server server(256);
   Child play(program({"play", "PolyTriangle", "-a", "jack", "-u", osc_port}),
              {{"NSM_URL", "osc.udp://127.0.0.1:9/"}});

@@ -1,14 +1,14 @@
-// Plays every model that there is, on the path of `ressort play`, with the clock of nobody:
+// Plays every model in the way of `ressort play`, with a simulated clock:
 //
 //   ressort_play_everything SECONDS [NETWORKS [SEED [FOLDER or FILE...]]]
 //
-// Each model in the folders (without any: the program's own models and presets and the tests'
-// corpus) and so many random networks, each alone and with a preset that puts controls of every
-// kind on it, for SECONDS each: keys, controllers, every gesture of every input, every parameter to
-// both ends; loaded once more while it sounds; and panic, after which it is silent. One in four is
-// computed in float, another on a machine that is never in time. A model may be refused for not
-// being stable, and then has to be played by force. Everything that comes out is finite and below
-// full scale; what the console prints is a number wherever it should be one.
+// Plays each model in the folders (default: the program's models and presets and the tests' corpus)
+// and random networks, each alone and with a preset that has controls of every kind, for SECONDS
+// each: keys, controllers, every gesture of every input, every parameter over its range, a load of
+// the same scene while it sounds, and panic, which must silence it. One model in four is computed
+// in float, another with a clock by which it is never in time. A model may be rejected as unstable,
+// and is then forced. All output must be finite and below full scale, and the numbers that the
+// console prints must be valid.
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -43,9 +43,9 @@ using namespace std::chrono_literals;
 constexpr double rate_hz = 48000.0;
 constexpr std::size_t longest_block = 512;
 constexpr std::size_t block_lengths[] = {256, 64, 512, 1, 333};
-constexpr double fade_s = 0.1;  // longer than every fade there is
+constexpr double fade_s = 0.1;  // longer than every fade
 
-// What is done to an instrument in one block.
+// Actions on an instrument in one block.
 struct Move {
   std::vector<std::uint8_t> midi;
   std::optional<Message> call;
@@ -107,7 +107,7 @@ std::vector<Move> moves_on(const Instrument& instrument) {
   return moves;
 }
 
-// A clock by which no block is done in time, so that voices have to give way.
+// A clock by which every block is late, so that voices are stolen.
 std::int64_t late_ns() {
   static std::int64_t now_ns = 0;
   return now_ns += 10'000'000;
@@ -131,7 +131,7 @@ class Harness {
     session_.on_audio_inputs([this](int wanted) { audio_inputs_ = wanted; });
   }
 
-  // One scene from its loading to its silence; what was wrong, if anything was.
+  // Loads a scene, plays it and lets it fade. Returns an error message if anything was wrong.
   std::string play(const std::string& path, double seconds) {
     wrong_.clear();
     peak_ = 0.0;
@@ -166,7 +166,7 @@ class Harness {
     }
   }
 
-  // While what sounds goes on; by force where it is not stable.
+  // Loads a scene while another sounds, by force if it is unstable.
   bool load(const std::string& path) {
     is_forced_ = false;
     std::string refusal = try_to_load(path, false);
@@ -202,7 +202,7 @@ class Harness {
     return refusal;
   }
 
-  // Modes that took too long to find before the first note take over behind the sound.
+  // Waits for modes that took too long to find before the first note.
   void await_better_form() {
     const auto& parts = session_.current()->plan.parts;
     const bool is_coming =
@@ -220,7 +220,7 @@ class Harness {
     std::size_t next = 0;
     const auto frames = static_cast<std::size_t>(seconds * rate_hz);
     for (std::size_t at = 0; at < frames || next < moves.size();) {
-      // As many as it takes to be through with them in time, but no more than one in a block.
+      // Spreads the moves over the time, at most one in a block.
       const bool is_due = next < moves.size() && next * frames <= at * moves.size();
       const Move* const move = is_due || at >= frames ? &moves[next++] : nullptr;
       if (move != nullptr && move->call) {
@@ -267,7 +267,7 @@ class Harness {
     }
   }
 
-  // A block now and then, while somebody else is at work.
+  // Plays a block now and then while the worker is busy.
   void play_on() {
     block({});
     std::this_thread::sleep_for(1ms);
@@ -339,7 +339,7 @@ class Everything {
     play(shown, {folder_ / model, folder_ / preset});
   }
 
-  // One after the other on one harness, so that each fades into the next.
+  // Plays scenes one after the other on one harness, so that each fades into the next.
   void play(const std::string& shown, const std::vector<fs::path>& scenes) {
     const std::size_t turn = turn_++;
     Harness harness(turn % 4 == 3 ? Precision::float32 : Precision::float64,
@@ -371,7 +371,7 @@ class Everything {
   std::size_t failures_ = 0;
 };
 
-// Of a folder and those in it, or one file; sorted.
+// Returns the scenes in a folder and its subfolders, or one file; sorted.
 std::set<fs::path> scenes_in(const fs::path& where) {
   std::set<fs::path> found;
   if (fs::is_directory(where)) {

@@ -1,4 +1,4 @@
-// tests: the program on a server as these tests play it, and what it says of itself.
+// tests: the program on a server, with its own reports.
 #pragma once
 
 #include <lo/lo.h>
@@ -19,8 +19,8 @@ inline lo_address osc() {
   return address;
 }
 
-// A preset whose every note is the same click and gone 60 dB down in 1400 frames: whoever listens
-// for the next one hears nothing else.
+// A preset with one click for every note, which decays by 60 dB within 1400 frames, so that the
+// next click can be detected.
 inline const char* click() {
   static const std::string path = [] {
     const std::string name = "ressort-click-" + std::to_string(getpid());
@@ -56,7 +56,7 @@ inline bool answers() {
   return answered;
 }
 
-// Whether the console's status shows this text, just now.
+// Returns true if the console's status contains this text now.
 inline bool status_shows(Child& play, const std::string& text) {
   play.forget();
   play.write("status\n");

@@ -1,4 +1,4 @@
-// tests: a library to interpose (LD_PRELOAD) that counts what must not happen in the JACK process
+// tests: a library to interpose (LD_PRELOAD) that counts forbidden operations in the JACK process
 // callback: memory, locks, files, waiting. It wraps the callback that the program registers, so
 // that it knows when it is inside. The counts go to the file named by RTSPY_OUT at the end.
 #include <dlfcn.h>
@@ -44,7 +44,7 @@ int watched(jack_nframes_t frames, void* argument) {
   callbacks.fetch_add(1, std::memory_order_relaxed);
   ++inside;
   if (getenv("RTSPY_PROVOKE") != nullptr) {
-    free(malloc(16));  // shows that the spy sees
+    free(malloc(16));  // shows that the spy works
   }
   const int result = wrapped(frames, argument);
   --inside;
@@ -66,7 +66,7 @@ __attribute__((destructor)) void report() {
 
 }  // namespace
 
-// glibc's own names, so that dlsym, which allocates, is not needed on these paths.
+// glibc's internal names, because dlsym allocates.
 extern "C" {
 void* __libc_malloc(size_t);
 void* __libc_calloc(size_t, size_t);

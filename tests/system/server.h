@@ -1,5 +1,5 @@
-// tests: a stage for the whole program. A JACK server, the program itself, and a listener that
-// plays and records sample by sample.
+// tests: fixtures for the whole program: a JACK server, the program, and a listener that plays MIDI
+// and records every sample.
 #pragma once
 
 #include <fcntl.h>
@@ -28,7 +28,7 @@ namespace ressort::servers {
 
 using namespace std::chrono_literals;
 
-// Until `holds`, or false after a time that only a hang exceeds.
+// Waits until `holds` is true; returns false after a time that only a hang exceeds.
 inline bool eventually(const std::function<bool()>& holds, std::chrono::seconds patience = 20s) {
   const auto end = std::chrono::steady_clock::now() + patience;
   while (!holds()) {
@@ -40,7 +40,7 @@ inline bool eventually(const std::function<bool()>& holds, std::chrono::seconds 
   return true;
 }
 
-// A child process whose output can be waited for and whose input can be written.
+// A child process. Its output can be awaited, and its input written.
 class Child {
  public:
   explicit Child(std::vector<std::string> words,
@@ -105,7 +105,7 @@ class Child {
   bool says(const std::string& text) {
     return eventually([&] { return said().find(text) != std::string::npos; });
   }
-  // Only what comes after this counts for says().
+  // says() only searches the output after this call.
   void forget() {
     said();
     said_.clear();
@@ -134,14 +134,14 @@ class Child {
   std::string said_;
 };
 
-// One name for every server: a killed one leaves its name's slot in JACK's registry.
+// One name for all servers, because a killed server leaves its slot in JACK's registry.
 inline constexpr const char* server_name = "ressort-test";
 
 inline void use_test_server() {
   setenv("JACK_DEFAULT_SERVER", server_name, 1);
   setenv("JACK_NO_START_SERVER", "1", 1);
   setenv("JACK_NO_AUDIO_RESERVATION", "1", 1);
-  // What a program keeps of its own is not the person's who runs the tests.
+  // Keeps the user's own data untouched.
   setenv("XDG_DATA_HOME", ("/tmp/ressort-data-" + std::to_string(getpid())).c_str(), 1);
   jack_set_error_function([](const char*) {});
   jack_set_info_function([](const char*) {});
@@ -151,7 +151,7 @@ class Server {
  public:
   explicit Server(int period_frames, int rate_hz = 48000) {
     use_test_server();
-    // What it has to say is for nobody: a server that nobody reads would wait for a reader.
+    // Output to a full pipe would block the server.
     jackd_ = std::make_unique<Child>(std::vector<std::string>{
         "sh", "-c",
         "exec jackd -r -n " + std::string(server_name) + " -d dummy -r " + std::to_string(rate_hz) +
@@ -171,15 +171,15 @@ class Server {
   std::unique_ptr<Child> jackd_;
 };
 
-// The program, as built.
+// The program as built.
 inline std::vector<std::string> program(std::initializer_list<std::string> arguments) {
   std::vector<std::string> words{RESSORT_PROGRAM};
   words.insert(words.end(), arguments);
   return words;
 }
 
-// A JACK client that sends MIDI at exact frames and keeps every sample of what it hears. Frames
-// are its own count, which is also the index into `heard`.
+// A JACK client that sends MIDI at exact frames and records every sample. Frames are its own count,
+// which is also the index into `heard`.
 class Listener {
  public:
   struct Message {
@@ -196,10 +196,10 @@ class Listener {
   }
   ~Listener() { jack_client_close(client_); }
 
-  // Before start(): sorted by frame.
+  // Call it before start(), with messages sorted by frame.
   void plan(std::vector<Message> messages) { messages_ = std::move(messages); }
 
-  // `connect` is called before it rolls.
+  // `connect` is called before the recording starts.
   void start(
       const std::string& from, const std::string& midi_to,
       const std::function<void()>& connect = [] {}) {
@@ -226,7 +226,7 @@ class Listener {
   }
   float heard(std::size_t frame) const { return heard_[frame]; }
 
-  // The first frame at or after `from` where the sound is above the threshold.
+  // Returns the first frame from `from` on where the sound exceeds the threshold.
   std::size_t onset(std::size_t from, std::size_t to, float threshold) const {
     for (std::size_t i = from; i < std::min(to, frames()); ++i) {
       if (std::fabs(heard_[i]) > threshold) {
@@ -270,7 +270,7 @@ class Listener {
   std::atomic<bool> is_rolling_{false};
 };
 
-// A JACK client that somebody connects by hand: ports without a sound.
+// A silent JACK client with ports to connect by hand.
 class Neighbour {
  public:
   Neighbour() {

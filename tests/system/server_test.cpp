@@ -1,4 +1,4 @@
-// The whole program on a real JACK server: what a musician would notice, measured.
+// The whole program on a real JACK server, measured as a musician would notice it.
 #include <lo/lo.h>
 
 #include <atomic>
@@ -14,11 +14,11 @@ namespace ressort::servers::server_test {
 
 namespace {
 
-constexpr std::size_t spacing = 21001;  // frames; a prime, so that every place in a block occurs
+constexpr std::size_t spacing = 21001;  // frames; a prime, so that every position in a block occurs
 constexpr int notes = 14;
 constexpr std::size_t first_note = 20000;  // frame
 
-// So many clicks, `spacing` apart.
+// Clicks at intervals of `spacing`.
 std::vector<Listener::Message> clicks() {
   std::vector<Listener::Message> messages;
   for (std::size_t n = 0; n < notes; ++n) {
@@ -37,7 +37,7 @@ std::vector<std::size_t> onsets(const Listener& listener, std::size_t first) {
   return found;
 }
 
-// All clicks() are heard, and as late as each other to the frame; how late.
+// Checks that all clicks() are heard with the same latency to the frame. Returns the latency.
 std::size_t check_clicks(const Listener& listener) {
   const std::vector<std::size_t> late = onsets(listener, first_note);
   const auto [least, most] = std::minmax_element(late.begin(), late.end());
@@ -60,7 +60,7 @@ TEST_CASE("MIDI notes start on their frame", "[jack_midi]") {
   std::printf("MIDI onsets: %zu frames after the event\n", check_clicks(listener));
 }
 
-TEST_CASE("The last of two and a half thousand messages in one block is heard", "[jack_midi]") {
+TEST_CASE("The last of 2500 messages in one block is played", "[jack_midi]") {
   const Server server(1024);
   Child play(program({"play", click(), "-a", "jack", "-i", "-u", osc_port}));
   REQUIRE(answers());
@@ -79,7 +79,7 @@ TEST_CASE("OSC bundles start on the frame of their time tag", "[osc_time]") {
   REQUIRE(answers());
   Listener listener(48000 + (notes + 4) * spacing);
   listener.start("ressort:out_left", "");
-  // NTP time in units of 2^-32 s, so that the spacing is as exact as a time tag can say it.
+  // NTP time in units of 2^-32 s, as exact as a time tag.
   lo_timetag now;
   lo_timetag_now(&now);
   const unsigned long long start =
@@ -118,9 +118,9 @@ TEST_CASE("OSC bundles start on the frame of their time tag", "[osc_time]") {
   std::printf("OSC bundles: at most %zu frames from the exact spacing\n", worst);
 }
 
-// What is sent and asked goes through one socket and one queue: an answer comes after all before
+// Messages and requests go through one socket and one queue, so an answer comes after all before
 // it.
-TEST_CASE("Notes and panic get through a flood, with the future full", "[flood]") {
+TEST_CASE("Notes and panic get through a flood with a full future queue", "[flood]") {
   Child play(program({"play", "PolyTriangle", "-a", "dummy", "-m", "none", "-u", osc_port}));
   REQUIRE(answers());
   lo_timetag now;
@@ -136,7 +136,7 @@ TEST_CASE("Notes and panic get through a flood, with the future full", "[flood]"
     lo_send_bundle(osc(), bundle);
     lo_bundle_free_recursive(bundle);
   }
-  // 4200 do not fit into 4096: the last two were refused, and are counted.
+  // 4200 events do not fit into 4096 places: the last two bundles were rejected and counted.
   CHECK(eventually([&] { return status_shows(play, "2800 dropped"); }));
 
   std::atomic<bool> enough{false};
@@ -145,7 +145,7 @@ TEST_CASE("Notes and panic get through a flood, with the future full", "[flood]"
     for (int i = 0; !enough; ++i) {
       lo_send(own, i % 2 == 0 ? "/bend" : "/pressure", "f", 0.01f * static_cast<float>(i % 100));
       if (i % 100 == 99) {
-        std::this_thread::sleep_for(1ms);  // 100 000 a second
+        std::this_thread::sleep_for(1ms);  // 100,000 a second
       }
     }
     lo_address_free(own);
@@ -154,7 +154,7 @@ TEST_CASE("Notes and panic get through a flood, with the future full", "[flood]"
   CHECK(eventually([&] { return status_shows(play, "voices  1 of 16"); }));
   play.write("noteoff 60\npanic\n");
   CHECK(eventually([&] { return status_shows(play, "voices  0 of 16"); }));
-  // By OSC too, as often as a packet is lost before the flood lets it in.
+  // By OSC too, repeated until a packet gets through the flood.
   play.write("noteon 64\n");
   CHECK(eventually([&] { return status_shows(play, "voices  1 of 16"); }));
   CHECK(eventually([&] {
@@ -163,7 +163,7 @@ TEST_CASE("Notes and panic get through a flood, with the future full", "[flood]"
   }));
   enough = true;
   flood.join();
-  std::this_thread::sleep_for(10s);  // the time of the bundles has come, and nobody waits for it
+  std::this_thread::sleep_for(10s);  // the time of the discarded bundles has come
   CHECK(status_shows(play, "voices  0 of 16"));
   play.signal(SIGTERM);
   CHECK(play.exit_code() == 0);
@@ -192,7 +192,7 @@ TEST_CASE("Two programs that share the notes sound as one", "[shared_notes]") {
     std::sort(messages.begin(), messages.end(),
               [](const auto& a, const auto& b) { return a.frame < b.frame; });
     listener->plan(messages);
-    Neighbour hands;  // connects what the listener does not
+    Neighbour hands;  // connects the ports that the listener does not
     for (const auto& share : shares) {
       REQUIRE(eventually([&] { return hands.connect(share[0] + ":out_right", "neighbour:left"); }));
     }
@@ -201,7 +201,7 @@ TEST_CASE("Two programs that share the notes sound as one", "[shared_notes]") {
         REQUIRE(hands.connect(shares[i][0] + ":out_left", "listener:in"));
         REQUIRE(hands.connect("listener:out", shares[i][0] + ":midi_in"));
       }
-      // Whoever is late is waited for.
+      // Freewheel mode waits for every client.
       REQUIRE(jack_set_freewheel(hands.client(), 1) == 0);
     });
     REQUIRE(listener->wait_for(frames));
@@ -221,12 +221,12 @@ TEST_CASE("Two programs that share the notes sound as one", "[shared_notes]") {
   }
   CAPTURE(peak, apart);
   CHECK(peak > 1e-3f);
-  CHECK(peak < 0.5f);                     // no limiter between them
-  CHECK(apart < 4.0f * 0x1p-24f * peak);  // JACK's samples are floats, rounded one by one
+  CHECK(peak < 0.5f);                     // the limiter was not active
+  CHECK(apart < 4.0f * 0x1p-24f * peak);  // JACK's samples are rounded to float one by one
   std::printf("two programs are %.1e of the peak from one\n", static_cast<double>(apart / peak));
 }
 
-TEST_CASE("RtMidi's messages are heard, through its JACK side", "[rtmidi]") {
+TEST_CASE("RtMidi's messages are played, through its JACK interface", "[rtmidi]") {
   const Server server(256);
   Child play(program({"play", click(), "-a", "dummy", "-m", "jack", "-u", osc_port}));
   REQUIRE(answers());
@@ -237,11 +237,11 @@ TEST_CASE("RtMidi's messages are heard, through its JACK side", "[rtmidi]") {
   }
   listener.plan(messages);
   listener.start("", "ressort:midi_in");
-  // The dummy backend is silent; the program's own meters tell whether it played.
+  // The dummy backend is silent; the meters tell whether it played.
   CHECK(eventually([&] { return status_shows(play, "voices  1 of 16"); }));
 }
 
-TEST_CASE("The ALSA null device runs, and plays what OSC asks for", "[alsa]") {
+TEST_CASE("The ALSA null device runs and plays OSC notes", "[alsa]") {
   Child play(
       program({"play", "PolyTriangle", "-a", "alsa", "-d", "null", "-m", "none", "-u", osc_port}));
   REQUIRE(answers());
@@ -251,14 +251,14 @@ TEST_CASE("The ALSA null device runs, and plays what OSC asks for", "[alsa]") {
     std::this_thread::sleep_for(50ms);
     return status_shows(play, "voices  1 of 16");
   }));
-  play.end_input();  // ends the console and nothing else
+  play.end_input();  // ends the console only
   lo_send(osc(), "/note/off", "i", 60);
   CHECK(answers());
   play.signal(SIGTERM);
   CHECK(play.exit_code() == 0);
 }
 
-TEST_CASE("What an ALSA device hears drives a model's audio inputs", "[alsa]") {
+TEST_CASE("The inputs of an ALSA device drive a model's audio inputs", "[alsa]") {
   // A device whose microphone plays a file: a sine of 440 Hz in floats.
   namespace fs = std::filesystem;
   const std::string there =
@@ -296,13 +296,13 @@ TEST_CASE("What an ALSA device hears drives a model's audio inputs", "[alsa]") {
   CHECK(heard_db <= 0.0);
   const double null_db = peak("null");
   CAPTURE(null_db);
-  CHECK((null_db < -100.0 || null_db == 0.0));  // "silent" is no number
+  CHECK((null_db < -100.0 || null_db == 0.0));  // silence is no number
   for (const char* const ending : {".raw", ".conf"}) {
     fs::remove(there + ending);
   }
 }
 
-TEST_CASE("A bounce is exact: every note on its frame, however fast it goes", "[jack_midi]") {
+TEST_CASE("A bounce is exact: every note is at its frame at any speed", "[jack_midi]") {
   const Server server(256);
   Child play(program({"play", click(), "-a", "jack", "-i", "-u", osc_port}));
   REQUIRE(answers());
@@ -322,7 +322,7 @@ TEST_CASE("A bounce is exact: every note on its frame, however fast it goes", "[
               took.count());
 }
 
-// PipeWire changes the period whenever a client comes or goes that wants another.
+// PipeWire changes the period when a client with another period comes or goes.
 TEST_CASE("Notes stay on their frame while the period changes", "[jack_midi]") {
   const Server server(1024);
   Child play(program({"play", click(), "-a", "jack", "-i", "-u", osc_port}));
@@ -341,7 +341,7 @@ TEST_CASE("Notes stay on their frame while the period changes", "[jack_midi]") {
   }
   REQUIRE(listener.wait_for(first_note + notes * spacing));
   jack_client_close(host);
-  // The listener is before and after the program, so it hears everything a period later.
+  // The listener runs before and after the program, so it hears everything a period later.
   const std::vector<std::size_t> late = onsets(listener, first_note);
   for (std::size_t n = 0; n < periods.size(); ++n) {
     CAPTURE(n, periods[n]);

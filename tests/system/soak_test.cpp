@@ -1,6 +1,5 @@
-// For as long as one likes: random play of all presets on a real server. What comes out is finite
-// and within full scale, memory stays where it was, every note ends, and the callback allocates,
-// locks and waits never.
+// Random play of all presets on a real server, for any time. The output is finite and within full
+// scale, memory does not grow, every note ends, and the callback never allocates, locks or waits.
 #include <lo/lo.h>
 
 #include <cmath>
@@ -19,7 +18,7 @@ namespace {
 
 constexpr const char* osc_port = "19781";
 
-// Plays keys at random, each for a while, and looks at every sample.
+// Plays random keys, each for a while, and checks every sample.
 class Hands {
  public:
   Hands() : client_(jack_client_open("hands", JackNoStartServer, nullptr)) {
@@ -41,7 +40,7 @@ class Hands {
 
   std::atomic<bool> is_playing{true};
   std::atomic<std::size_t> frames{0};
-  std::atomic<std::size_t> wrong{0};  // samples that are no number, or beyond full scale
+  std::atomic<std::size_t> wrong{0};  // samples that are not finite or exceed full scale
   std::atomic<std::size_t> loud{0};
   std::atomic<std::size_t> messages{0};
 
@@ -84,7 +83,7 @@ class Hands {
   jack_port_t* audio_ = nullptr;
   jack_port_t* midi_ = nullptr;
   Random random_{5};
-  std::map<unsigned char, std::size_t> down_;  // keys, and for how many frames
+  std::map<unsigned char, std::size_t> down_;  // keys with their remaining frames
 };
 
 double resident_mb(pid_t pid) {
@@ -97,7 +96,7 @@ double resident_mb(pid_t pid) {
 
 }  // namespace
 
-TEST_CASE("Random play for minutes leaves everything as it was", "[soak]") {
+TEST_CASE("Random play for minutes changes nothing", "[soak]") {
   const char* const asked = std::getenv("RESSORT_SOAK_MINUTES");
   const double minutes = asked != nullptr ? std::atof(asked) : 0.5;
   const std::string report = "/tmp/ressort-soak-" + std::to_string(getpid());
@@ -128,7 +127,7 @@ TEST_CASE("Random play for minutes leaves everything as it was", "[soak]") {
     play.forget();
   };
   double start_mb = 0.0;
-  for (const std::string& preset : presets) {  // the largest needs what it needs
+  for (const std::string& preset : presets) {  // the largest preset determines the memory
     play.forget();
     play.write("load " + preset + "\n");
     REQUIRE(play.says("loaded in"));
@@ -142,7 +141,7 @@ TEST_CASE("Random play for minutes leaves everything as it was", "[soak]") {
     most_mb = std::max(most_mb, resident_mb(play.pid()));
   }
   REQUIRE_FALSE(play.has_ended());
-  // Every key is up, pedals too: what still sounds ends by itself, or is stuck.
+  // All keys and pedals are up: any sound that does not end is stuck.
   hands.is_playing = false;
   lo_send(osc, "/cc", "ii", 64, 0);
   lo_send(osc, "/model/load", "s", "PolyTriangle");
@@ -165,7 +164,7 @@ TEST_CASE("Random play for minutes leaves everything as it was", "[soak]") {
     }
     std::remove(report.c_str());
   }
-  // What a flight keeps of an event is 48 bytes; all else is as it was.
+  // A flight needs 48 bytes for an event; nothing else grows.
   const double events = static_cast<double>(hands.messages - start_messages + sent);
   std::printf("%.1f minutes: %.1f MB at first, %.1f at most, %zu messages, %zu frames\n", minutes,
               start_mb, most_mb, hands.messages.load() + sent, hands.frames.load());

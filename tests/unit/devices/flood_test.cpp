@@ -1,5 +1,5 @@
-// More events than anybody can play, and a future that is full: what is to be heard is heard in the
-// next block, what is refused is counted, and a block's work is bounded.
+// More events than can be played, with a full queue of future events: audible events act in the
+// next block, rejected ones are counted, and the work of a block is bounded.
 #include "app/devices/midi_input.h"
 #include "tests/support/app/process_harness.h"
 
@@ -10,18 +10,18 @@ using namespace support;
 namespace {
 
 constexpr std::size_t period = 256;
-constexpr std::size_t flood = 581;         // of a period, at 100 000 a second
+constexpr std::size_t flood = 581;         // of a period, at 100,000 a second
 constexpr std::int64_t far = 432000;       // 9.8 s
 constexpr std::size_t steal_frames = 221;  // the fade of a panic, 5 ms
 
-// What drifts far would else be taken for a voice that lost its stability.
+// A larger drift would look like an unstable voice.
 Preset faint() {
   Preset preset;
   preset.gain = 0x1p-20;
   return preset;
 }
 
-// Everything but what starts or ends sound.
+// Sends all kinds of events that neither start nor end sound.
 void pour(Harness& harness, std::size_t count = flood) {
   for (std::size_t i = 0; i < count; ++i) {
     const double way = static_cast<double>(i % 100) / 100.0;
@@ -38,7 +38,7 @@ void fill_future(Harness& harness) {
   }
 }
 
-// Its hand is at 1 while a key is held; it sounds at full from the second block on.
+// The hand is at 1 while a key is held; it sounds at full level from the second block on.
 struct Held : Harness {
   Held() {
     process.slot.offer(sounding(hand_text, holding(), 1));
@@ -49,7 +49,7 @@ struct Held : Harness {
 
 }  // namespace
 
-TEST_CASE("a bundle that finds no room ahead is refused whole", "[flood]") {
+TEST_CASE("a bundle that does not fit into the future queue is rejected as a whole", "[flood]") {
   Harness harness;
   harness.process.slot.offer(sounding(clock_text, faint(), 1));
   CHECK(harness.at(1000, push(), 3000));
@@ -58,14 +58,14 @@ TEST_CASE("a bundle that finds no room ahead is refused whole", "[flood]") {
   CHECK(harness.at(2000, push(), Process::max_ahead - 3000));
   CHECK_FALSE(harness.at(2000, push()));
   harness.run(1001, 77);
-  CHECK(pushed_at(harness.y()) == 1000);  // nothing of the refused one acted
+  CHECK(pushed_at(harness.y()) == 1000);  // nothing of the rejected bundle acted
   CHECK(harness.y()[1000] == 3000.0 * faint().gain);
-  // What has acted leaves its room to others; what waits keeps its own.
+  // Acted events free their places; waiting ones keep theirs.
   CHECK_FALSE(harness.at(3000, push(), 3001));
   CHECK(harness.at(3000, push(), 3000));
 }
 
-TEST_CASE("no future silences what is to act now", "[flood]") {
+TEST_CASE("a full future queue does not block immediate events", "[flood]") {
   Harness harness;
   harness.process.slot.offer(sounding(ringing_string(), struck(4), 1));
   fill_future(harness);
@@ -83,14 +83,14 @@ TEST_CASE("no future silences what is to act now", "[flood]") {
     harness.run(period, period,
                 is_midi ? std::vector<MidiPacket>{{0, on}} : std::vector<MidiPacket>{});
     CHECK(peak(harness.y()) > 1e-4);
-    // And panic within the next one.
+    // And panic within the next block.
     harness.now({.kind = EventKind::panic});
     harness.run(2 * period);
     CHECK(peak(std::span(harness.y()).subspan(period + steal_frames)) == 0.0);
   }
 }
 
-TEST_CASE("panic forgets what waits for its time, and nothing that comes after it", "[flood]") {
+TEST_CASE("panic discards waiting events, but no later ones", "[flood]") {
   for (const bool is_controller : {false, true}) {
     Harness harness;
     harness.process.slot.offer(sounding(clock_text, faint(), 1));
@@ -104,7 +104,7 @@ TEST_CASE("panic forgets what waits for its time, and nothing that comes after i
       CHECK(harness.at(2000, push()) == false);  // still full
       harness.run(period);
     }
-    CHECK(harness.at(2000, push(), Process::max_ahead));  // all of its room is free again
+    CHECK(harness.at(2000, push(), Process::max_ahead));  // all places are free again
     harness.run(2000);
     CHECK(pushed_at(harness.y()) == 2000);
   }
@@ -116,7 +116,7 @@ TEST_CASE("panic forgets what waits for its time, and nothing that comes after i
   harness.at(600, push());
   harness.run(1000);
   CHECK(pushed_at(harness.y()) == 600);
-  // One with a time of its own forgets what would come after it, once it is there.
+  // A panic with a time discards later events when it acts.
   harness.at(3000, push());
   harness.at(2000, {.kind = EventKind::panic});
   harness.at(1500, push());
@@ -126,7 +126,8 @@ TEST_CASE("panic forgets what waits for its time, and nothing that comes after i
   CHECK(peak(std::span(harness.y()).subspan(1000 + steal_frames)) == 0.0);
 }
 
-TEST_CASE("note-offs and panic act in the next block of a flood, with the future full", "[flood]") {
+TEST_CASE("note-offs and panic act in the next block of a flood with a full future queue",
+          "[flood]") {
   for (const bool is_panic : {false, true}) {
     Held harness;
     fill_future(harness);
@@ -145,11 +146,11 @@ TEST_CASE("note-offs and panic act in the next block of a flood, with the future
     if (is_panic) {
       CHECK(peak(std::span(harness.y()).subspan(steal_frames)) == 0.0);
     }
-    CHECK(harness.process.meters().dropped == 512);  // the last try to fill the future
+    CHECK(harness.process.meters().dropped == 512);  // the last attempt to fill the future queue
   }
 }
 
-TEST_CASE("where no other event finds room, what ends sound does", "[flood]") {
+TEST_CASE("events that end sound have room when no other event has", "[flood]") {
   for (const Event& ending : {note_off(0, 60), Event{.kind = EventKind::panic},
                               controller(0, 120, 0.0), controller(0, 123, 0.0)}) {
     Held harness;
@@ -167,7 +168,7 @@ TEST_CASE("where no other event finds room, what ends sound does", "[flood]") {
   }
 }
 
-TEST_CASE("every event of a flood of MIDI that finds no room is counted", "[flood]") {
+TEST_CASE("every rejected event of a MIDI flood is counted", "[flood]") {
   const std::vector<std::uint8_t> on = {0x90, 60, 100};
   const std::vector<std::uint8_t> off = {0x80, 60, 0};
   {
@@ -192,8 +193,9 @@ TEST_CASE("every event of a flood of MIDI that finds no room is counted", "[floo
   CHECK(harness.y()[1] < 1.0);
 }
 
-TEST_CASE("a block acts at a bounded number of moments, early but in order", "[flood]") {
-  // A push on every frame: the first of them exactly, the others with the last of these.
+TEST_CASE("a block has a bounded number of cuts, and surplus events act early but in order",
+          "[flood]") {
+  // An event on every frame: the first ones exactly, the others at the last cut.
   for (const auto& [block, moments] : {std::pair<std::size_t, std::size_t>{64, 16}, {256, 32}}) {
     Harness harness;
     harness.process.slot.offer(sounding(clock_text, faint(), 1));
@@ -211,7 +213,7 @@ TEST_CASE("a block acts at a bounded number of moments, early but in order", "[f
   }
 }
 
-TEST_CASE("offline every event acts on its own frame, however many there are", "[flood]") {
+TEST_CASE("offline every event acts at its own frame", "[flood]") {
   Harness harness;
   harness.process.slot.offer(sounding(clock_text, faint(), 1));
   std::vector<Event> events;
@@ -226,8 +228,9 @@ TEST_CASE("offline every event acts on its own frame, however many there are", "
   CHECK(harness.y() == player.y());
 }
 
-TEST_CASE("what acts in one sample is computed once, from what all of it leaves", "[flood]") {
-  // A voice that starts with a turn of a parameter has it from its start on: no ramp is heard.
+TEST_CASE("events at one sample are applied together", "[flood]") {
+  // A voice that starts together with a parameter change has the new value from the start, without
+  // a ramp.
   const std::string text = scenes::poly_triangle();
   Player after(text, struck(1), {.method = Method::direct});
   after.run(2000, {note_on(0, 69), parameter(0, 0, 0.15), parameter(0, 0, 0.12)});
@@ -237,7 +240,7 @@ TEST_CASE("what acts in one sample is computed once, from what all of it leaves"
   CHECK(peak(after.y()) > 0.001);
 }
 
-TEST_CASE("the audio thread allocates nothing in a flood", "[flood]") {
+TEST_CASE("the audio thread does not allocate in a flood", "[flood]") {
   Held harness;
   for (int i = 0; i < 4; ++i) {
     fill_future(harness);

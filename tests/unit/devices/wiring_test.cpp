@@ -1,4 +1,4 @@
-// What a device's ports are connected to: kept by name, until a person pulls it.
+// Connections of a device's ports: remembered by name until a person removes them.
 #include "app/devices/wiring.h"
 
 #include <set>
@@ -25,7 +25,7 @@ const Ports all{speaker.theirs, mixer.theirs, keyboard.theirs};
 
 }  // namespace
 
-TEST_CASE("all cables are missing when the device is lost, until they are there again",
+TEST_CASE("all connections are missing after the device is lost, until they are restored",
           "[wiring]") {
   Wiring wiring;
   look(wiring, {speaker, mixer, keyboard}, all);
@@ -35,11 +35,11 @@ TEST_CASE("all cables are missing when the device is lost, until they are there 
   look(wiring, {}, {});
   look(wiring, {speaker}, {speaker.theirs});
   CHECK(wiring.missing() == std::vector<Cable>{mixer, keyboard});
-  wiring.mark_all_missing();  // once more, before all had come
+  wiring.mark_all_missing();  // once more, before all were restored
   CHECK(wiring.missing() == std::vector<Cable>{speaker, mixer, keyboard});
 }
 
-TEST_CASE("what a person pulled stays pulled, until it is plugged in again", "[wiring]") {
+TEST_CASE("a removed connection stays removed until a person makes it again", "[wiring]") {
   Wiring wiring;
   look(wiring, {speaker, mixer}, all);
   look(wiring, {speaker}, all);
@@ -48,17 +48,18 @@ TEST_CASE("what a person pulled stays pulled, until it is plugged in again", "[w
   CHECK_FALSE(wiring.is_in_doubt());
   wiring.mark_all_missing();
   CHECK(wiring.missing() == std::vector<Cable>{speaker});
-  CHECK(wiring.knows(mixer));  // so that nobody plugs it in by himself
+  CHECK(wiring.knows(mixer));  // so that nothing reconnects it
   CHECK_FALSE(wiring.knows(keyboard));
   look(wiring, {speaker, mixer}, all);
   wiring.mark_all_missing();
   CHECK(wiring.missing() == std::vector<Cable>{speaker, mixer});
 }
 
-TEST_CASE("a client that leaves takes its cables first, and does not pull them", "[wiring]") {
+TEST_CASE("a closing client loses its connections first, which does not count as removal",
+          "[wiring]") {
   Wiring wiring;
   look(wiring, {speaker, mixer}, all);
-  look(wiring, {speaker}, all);         // between its cables and its ports
+  look(wiring, {speaker}, all);         // between its connections and its ports
   look(wiring, {speaker}, all, false);  // and once more, as something else moves
   CHECK(wiring.is_in_doubt());
   look(wiring, {speaker}, {speaker.theirs});
@@ -69,23 +70,23 @@ TEST_CASE("a client that leaves takes its cables first, and does not pull them",
   CHECK(wiring.missing().empty());
 }
 
-TEST_CASE("a port that has gone and come back between two looks was not pulled", "[wiring]") {
+TEST_CASE("a port that returns between two updates was not disconnected", "[wiring]") {
   Wiring wiring;
   look(wiring, {speaker, mixer, keyboard}, all);
   wiring.mark_missing(keyboard.theirs);
-  look(wiring, {speaker}, all);  // it is back, and the mixer was pulled meanwhile
+  look(wiring, {speaker}, all);  // it is back, and the mixer was removed meanwhile
   CHECK(wiring.missing() == std::vector<Cable>{keyboard});
   CHECK(wiring.is_in_doubt());
   look(wiring, {speaker}, all);
   CHECK(wiring.missing() == std::vector<Cable>{keyboard});
   look(wiring, {speaker, keyboard}, all);
   CHECK(wiring.missing().empty());
-  // Told of only after it was seen to be unplugged.
+  // Reported only after it was seen to be unplugged.
   look(wiring, {speaker}, all);
   wiring.mark_missing(keyboard.theirs);
   look(wiring, {speaker}, all);
   CHECK(wiring.missing() == std::vector<Cable>{keyboard});
-  wiring.mark_missing(mixer.theirs);  // which a person has pulled
+  wiring.mark_missing(mixer.theirs);  // removed by a person
   CHECK(wiring.missing() == std::vector<Cable>{keyboard});
 }
 

@@ -1,5 +1,5 @@
-// Threads that help the audio thread: whatever they do, or do not do in time, what is heard is what
-// one thread alone would have played, to the bit. Run it under ThreadSanitizer too.
+// Helper threads: the output has the same bits as from one thread, whatever the helpers do or fail
+// to do in time. Run it under ThreadSanitizer too.
 #include <signal.h>
 #include <sys/syscall.h>
 #include <time.h>
@@ -43,7 +43,8 @@ Threads own_threads() {
   return threads;
 }
 
-// Stops threads of this process at any instruction, as a scheduler does, for up to `longest_us`.
+// Stops threads of this process at arbitrary instructions, like a scheduler, for up to
+// `longest_us`.
 class Stalls {
  public:
   Stalls(const Threads& threads, int longest_us)
@@ -84,7 +85,7 @@ class Stalls {
 std::atomic<int> Stalls::count{0};
 std::atomic<int> Stalls::pause_us{1};
 
-// A chord, a bend, parameters on their way, keys up, another chord: in periods of every length.
+// Plays a chord, a bend, parameter ramps, releases and another chord in blocks of every length.
 std::vector<double> played(Engine& engine, SeqLock<ClockReading>& clock, std::size_t frames,
                            int period) {
   const DenormalsFlushed flushed;
@@ -102,7 +103,7 @@ std::vector<double> played(Engine& engine, SeqLock<ClockReading>& clock, std::si
         period > 0 ? static_cast<std::size_t>(period) : std::size_t{1} << random.below(11);
     clock.write({static_cast<std::int64_t>(at), 0, 48000.0, static_cast<std::int64_t>(count)});
     std::vector<Event> events;
-    // At the frames 0, 1000, 2000...: each in whichever block it falls.
+    // Events at the frames 0, 1000, 2000 and so on, each in the block that contains it.
     for (; next_event * 1000 < at + count; ++next_event) {
       const auto frame = static_cast<std::uint32_t>(next_event * 1000 - at);
       const auto key = static_cast<std::uint16_t>(40 + next_event * 5 % 37);
@@ -141,7 +142,7 @@ std::unique_ptr<Engine> engine_of(const std::string& preset, Executor* executor,
   return std::move(compiled->engine);
 }
 
-// A task whose helper is held at a gate.
+// A task whose helper waits at a gate.
 struct Gated final : Task {
   void perform() override { ++performed; }
   void offer() override { ++offered; }
@@ -162,7 +163,7 @@ struct Gated final : Task {
   int taken = 0;
 };
 
-// Two tasks for two threads, the second of which is shut.
+// Two tasks for two threads. The gate of the second is closed.
 struct GatedCrew {
   GatedCrew() { second.is_shut = true; }
   void run() {
@@ -170,7 +171,7 @@ struct GatedCrew {
     crew->run(both);
     ++runs;
   }
-  // Until the helper has come to the gate.
+  // Waits until the helper is at the gate.
   void catch_helper() {
     while (second.inside == 0 && runs < 1000000) {
       run();
@@ -188,11 +189,11 @@ struct GatedCrew {
 
 }  // namespace
 
-TEST_CASE("who is held in the midst of a task is not waited for", "[helpers]") {
+TEST_CASE("a helper that is stopped during a task is not waited for", "[helpers]") {
   GatedCrew gated;
   gated.clock.write({0, 0, 48000.0, 64});
   gated.catch_helper();
-  // It has it for a hundred rounds: each of them is played, without it.
+  // The helper keeps the task for a hundred rounds; each round is played without it.
   const Gated& first = gated.first;
   Gated& second = gated.second;
   const int before = second.performed;
@@ -205,7 +206,7 @@ TEST_CASE("who is held in the midst of a task is not waited for", "[helpers]") {
   CHECK(first.performed + first.accepted + first.taken == gated.runs);
   const int offered = second.offered;
   gated.run();
-  CHECK(second.offered == offered);  // as long as somebody is in it
+  CHECK(second.offered == offered);  // while a helper holds it
   second.is_shut = false;
   while (second.inside > 0) {
     std::this_thread::yield();
@@ -217,7 +218,7 @@ TEST_CASE("who is held in the midst of a task is not waited for", "[helpers]") {
   CHECK(second.offered > again);
 }
 
-TEST_CASE("a crew does not end before its helpers have left it", "[helpers]") {
+TEST_CASE("a crew is not destroyed while a helper uses it", "[helpers]") {
   GatedCrew gated;
   gated.clock.write({0, 0, 48000.0, 64});
   gated.catch_helper();
@@ -230,7 +231,7 @@ TEST_CASE("a crew does not end before its helpers have left it", "[helpers]") {
   opener.join();
 }
 
-TEST_CASE("what is taken over goes on as if nobody had helped", "[helpers]") {
+TEST_CASE("a task that is taken over continues as without a helper", "[helpers]") {
   struct Case {
     const char* preset;
     std::optional<Method> method;
@@ -266,7 +267,7 @@ TEST_CASE("what is taken over goes on as if nobody had helped", "[helpers]") {
       }
     }
     support::Random random(5);
-    int lent = 0;  // blocks that a late helper has been in it for
+    int lent = 0;  // blocks since a late helper took it
     double peak = 0.0;
     for (int block = 0; block < 300; ++block) {
       task.frames = 1 + random.below(64);
@@ -284,7 +285,7 @@ TEST_CASE("what is taken over goes on as if nobody had helped", "[helpers]") {
       if (lent > 0) {
         task.perform();
         if (--lent == 0) {
-          task.perform_aside();  // at last, of what is long over
+          task.perform_aside();  // late, for a round long past
         }
       } else if (way == 0) {
         task.perform();
@@ -307,7 +308,7 @@ TEST_CASE("what is taken over goes on as if nobody had helped", "[helpers]") {
   }
 }
 
-TEST_CASE("helpers play the bits of one thread, whatever stops them", "[helpers]") {
+TEST_CASE("helpers produce the bits of one thread, even when they are stopped", "[helpers]") {
   struct Case {
     const char* preset;
     std::optional<Method> method;
@@ -345,13 +346,13 @@ TEST_CASE("helpers play the bits of one thread, whatever stops them", "[helpers]
       }
     }
   }
-#if !defined(__SANITIZE_THREAD__)  // which puts signals off
+#if !defined(__SANITIZE_THREAD__)  // ThreadSanitizer delays signals
   CHECK(Stalls::count > 100);
 #endif
   std::printf("%llu tasks were taken over\n", static_cast<unsigned long long>(taken_over));
 }
 
-TEST_CASE("The memory of what helpers work in is known before it is taken", "[helpers]") {
+TEST_CASE("the memory of the helpers' copies is predicted", "[helpers]") {
   if (!support::heap_is_counted) {
     return;
   }
@@ -383,7 +384,7 @@ TEST_CASE("The memory of what helpers work in is known before it is taken", "[he
   }
 }
 
-TEST_CASE("a large network's shards are played by helpers to the bit", "[helpers]") {
+TEST_CASE("helpers play the shards of a large network with the same bits", "[helpers]") {
   const std::string text =
       "@K param 0.2\n@p closedMesh 120 100 1. K 0.003 0. 0.\n@in1 frcInput [@p 0.4 0.3]\n"
       "@out1 posOutput [@p 0.51 0.7]\n";

@@ -1,5 +1,4 @@
-// What passes between threads: nothing lost, nothing twice, nothing torn. Run it under
-// ThreadSanitizer too.
+// Lock-free structures: nothing is lost, duplicated or torn. Run it under ThreadSanitizer too.
 #include "app/realtime/lockfree.h"
 
 #include <algorithm>
@@ -26,7 +25,7 @@ struct Counted {
 
 }  // namespace
 
-TEST_CASE("a slot hands over a hundred thousand objects: none lost, none twice", "[lockfree]") {
+TEST_CASE("a slot hands over 100,000 objects without loss or duplicates", "[lockfree]") {
   constexpr int count = 100000;
   Slot<Counted> slot;
   std::atomic<bool> all_offered{false};
@@ -34,7 +33,7 @@ TEST_CASE("a slot hands over a hundred thousand objects: none lost, none twice",
   std::vector<char> was_taken(count, 0);
   bool touched_right = true;
 
-  // As the audio thread: takes the newest, gives back the one before.
+  // The audio thread: takes the newest and returns the one before.
   std::thread audio([&] {
     Counted* current = nullptr;
     Counted* leaving = nullptr;
@@ -47,7 +46,7 @@ TEST_CASE("a slot hands over a hundred thousand objects: none lost, none twice",
       if (leaving == nullptr) {
         if (Counted* const next = slot.take()) {
           if (next->serial <= newest) {
-            touched_right = false;  // an older one after a newer
+            touched_right = false;  // an older one after a newer one
           }
           newest = next->serial;
           next->touched += 1;
@@ -76,7 +75,7 @@ TEST_CASE("a slot hands over a hundred thousand objects: none lost, none twice",
     bury(slot.offer(new Counted(i)), false);
     bury(slot.collect(), true);
     if (i % 16 == 0) {
-      std::this_thread::yield();  // on one core too the other side gets its turn
+      std::this_thread::yield();  // the other side runs even on one core
     }
   }
   all_offered.store(true);
@@ -110,7 +109,7 @@ TEST_CASE("a slot holds one offer and one returned object", "[lockfree]") {
   CHECK(slot.collect() == &b);
 }
 
-TEST_CASE("a ring keeps order, and a full one refuses", "[lockfree]") {
+TEST_CASE("a ring keeps the order, and a push into a full ring fails", "[lockfree]") {
   Ring<int> ring(100);
   int item = 0;
   CHECK_FALSE(ring.pop(item));
@@ -130,7 +129,7 @@ TEST_CASE("a ring keeps order, and a full one refuses", "[lockfree]") {
   CHECK(ring.push(8));
 }
 
-TEST_CASE("a ring takes all of a bundle or none", "[lockfree]") {
+TEST_CASE("a ring takes all of a bundle or nothing", "[lockfree]") {
   Ring<int> ring(64);
   const std::vector<int> bundle(10, 1);
   std::size_t held = 0;
@@ -140,7 +139,7 @@ TEST_CASE("a ring takes all of a bundle or none", "[lockfree]") {
     REQUIRE(held < 1000);
   }
   CHECK(held == 60);
-  CHECK(ring.size() == held);  // the refused one left nothing
+  CHECK(ring.size() == held);  // the rejected one left nothing
   int item = 0;
   for (std::size_t i = 0; i < 10; ++i) {
     CHECK(ring.pop(item));
@@ -148,12 +147,12 @@ TEST_CASE("a ring takes all of a bundle or none", "[lockfree]") {
   CHECK(ring.push_all(bundle));
   CHECK(ring.push_all({}));
   CHECK_FALSE(ring.push_all(std::vector<int>(10000, 1)));
-  // 60 of 64 again: what is to stay free does.
+  // With 60 of 64 places used, the reserved places stay free.
   CHECK_FALSE(ring.push_all(std::vector<int>(2, 1), 3));
   CHECK(ring.push_all(std::vector<int>(2, 1), 2));
 }
 
-TEST_CASE("a ring between two threads loses nothing and keeps bundles whole", "[lockfree]") {
+TEST_CASE("a ring between two threads loses nothing and keeps bundles together", "[lockfree]") {
   constexpr int bundles = 20000;
   Ring<int> ring(256);
   std::thread writer([&] {
@@ -181,7 +180,7 @@ TEST_CASE("a ring between two threads loses nothing and keeps bundles whole", "[
   CHECK(ring.size() == 0);
 }
 
-TEST_CASE("permits are never taken twice, and none is lost between two threads", "[lockfree]") {
+TEST_CASE("permits are never taken twice or lost between two threads", "[lockfree]") {
   Permits permits(100);
   CHECK_FALSE(permits.take(101));
   CHECK(permits.take(60));
@@ -189,7 +188,7 @@ TEST_CASE("permits are never taken twice, and none is lost between two threads",
   CHECK(permits.free() == 40);
   permits.give_back(60);
 
-  Ring<int> ring(100);  // with a place for each of its items it is never full
+  Ring<int> ring(100);  // with a place for each item, it is never full
   constexpr int count = 100000;
   bool had_room = true;
   std::thread taker([&] {
@@ -215,7 +214,7 @@ TEST_CASE("permits are never taken twice, and none is lost between two threads",
   CHECK(permits.free() == 100);
 }
 
-TEST_CASE("a counter misses nothing that two threads add", "[lockfree]") {
+TEST_CASE("a counter adds up the counts of two threads", "[lockfree]") {
   Counter counter;
   const auto add = [&] {
     for (int i = 0; i < 100000; ++i) {
@@ -228,7 +227,7 @@ TEST_CASE("a counter misses nothing that two threads add", "[lockfree]") {
   CHECK(counter.get() == 400000);
 }
 
-TEST_CASE("a clock board is never read half written", "[lockfree]") {
+TEST_CASE("a sequence lock is always read as a whole", "[lockfree]") {
   SeqLock<ClockReading> board;
   CHECK(board.read().rate_hz == 0.0);
   std::atomic<bool> done{false};
@@ -259,7 +258,7 @@ TEST_CASE("a clock board is never read half written", "[lockfree]") {
   CHECK(forward);
 }
 
-TEST_CASE("a triple buffer gives the newest, whole, and each once", "[lockfree]") {
+TEST_CASE("a triple buffer passes the newest value, whole and once", "[lockfree]") {
   using Numbers = std::array<std::uint64_t, 64>;
   TripleBuffer<Numbers> buffer{Numbers{}};
   CHECK_FALSE(buffer.take());
@@ -296,7 +295,7 @@ TEST_CASE("a triple buffer gives the newest, whole, and each once", "[lockfree]"
   CHECK(newest);
   buffer.take();
   CHECK(buffer.reading()[0] == published.load());
-  CHECK_FALSE(buffer.take());  // the last only once
+  CHECK_FALSE(buffer.take());  // each value only once
 }
 
 TEST_CASE("counters and flags", "[lockfree]") {
@@ -310,7 +309,7 @@ TEST_CASE("counters and flags", "[lockfree]") {
   CHECK(flag.is_raised());
   CHECK(flag.lower());
   CHECK_FALSE(flag.is_raised());
-  // However many raise it, only one lowers it.
+  // However many threads raise the flag, only one lowers it.
   for (int i = 0; i < 200; ++i) {
     flag.raise();
     std::atomic<int> lowered{0};

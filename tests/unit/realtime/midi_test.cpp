@@ -1,4 +1,4 @@
-// MIDI bytes to events: every message, and everything that can be wrong with one.
+// MIDI bytes to events: every message and every error in one.
 #include "app/realtime/midi.h"
 
 #include <algorithm>
@@ -35,7 +35,7 @@ void check_event(const Event& event, EventKind kind, int channel, int index, dou
 
 }  // namespace
 
-TEST_CASE("every channel message becomes its event", "[midi]") {
+TEST_CASE("every channel message becomes an event", "[midi]") {
   const auto events = read({0x93, 60,  127,  0x83, 61,   64, 0xa0, 62,   1,  0xbf,
                             1,    127, 0xd2, 127,  0xe1, 0,  64,   0x90, 63, 0});
   REQUIRE(events.size() == 7);
@@ -46,10 +46,10 @@ TEST_CASE("every channel message becomes its event", "[midi]") {
   check_event(events[4], EventKind::pressure, 2, 0, 1.0);
   check_event(events[5], EventKind::bend, 1, 0, 0.0);
   check_event(events[6], EventKind::note_off, 0, 63,
-              usual_release_velocity);  // a note on of no velocity
+              usual_release_velocity);  // a note on with velocity 0
 }
 
-TEST_CASE("the bend reaches both ends exactly", "[midi]") {
+TEST_CASE("the bend reaches -1 and 1 exactly", "[midi]") {
   CHECK(read({0xe0, 0, 0})[0].value == -1.0);
   CHECK(read({0xe0, 0x7f, 0x7f})[0].value == 1.0);
   CHECK(read({0xe0, 0, 0x40})[0].value == 0.0);
@@ -57,7 +57,7 @@ TEST_CASE("the bend reaches both ends exactly", "[midi]") {
   CHECK(read({0xe0, 0x7f, 0x3f})[0].value == -1.0 / 8192.0);
 }
 
-TEST_CASE("running status holds within a packet and from packet to packet", "[midi]") {
+TEST_CASE("running status works within a packet and across packets", "[midi]") {
   MidiReader reader;
   auto events = read(reader, {0x90, 60, 100, 61, 100, 62, 0});
   REQUIRE(events.size() == 3);
@@ -66,7 +66,7 @@ TEST_CASE("running status holds within a packet and from packet to packet", "[mi
   events = read(reader, {63, 100});
   REQUIRE(events.size() == 1);
   check_event(events[0], EventKind::note_on, 0, 63, 100 / 127.0);
-  // Clocks leave it alone; system common ends it.
+  // Clocks do not end running status; system common messages do.
   CHECK(read(reader, {0xf8, 0xfe}).empty());
   CHECK(read(reader, {64, 100}).size() == 1);
   CHECK(read(reader, {0xf1, 7}).empty());
@@ -75,7 +75,7 @@ TEST_CASE("running status holds within a packet and from packet to packet", "[mi
   CHECK(reader.malformed() > 0);
 }
 
-TEST_CASE("real-time bytes may stand anywhere", "[midi]") {
+TEST_CASE("real-time bytes may appear anywhere", "[midi]") {
   MidiReader reader;
   const auto events = read(reader, {0xf8, 0x90, 0xfe, 60, 0xf8, 0xff, 100, 0xfa});
   REQUIRE(events.size() == 1);
@@ -83,7 +83,7 @@ TEST_CASE("real-time bytes may stand anywhere", "[midi]") {
   CHECK(reader.malformed() == 0);
 }
 
-TEST_CASE("system exclusive is passed over, in one packet or in several", "[midi]") {
+TEST_CASE("unknown system exclusive messages are ignored, in one packet or several", "[midi]") {
   MidiReader reader;
   auto events = read(reader, {0xf0, 0x7e, 60, 100, 1, 0xf7, 0x90, 60, 100});
   CHECK(events.size() == 1);
@@ -92,13 +92,13 @@ TEST_CASE("system exclusive is passed over, in one packet or in several", "[midi
   CHECK(read(reader, {4, 0xf7}).empty());
   CHECK(read(reader, {0x91, 60, 100}).size() == 1);
   CHECK(reader.malformed() == 0);
-  // Cut short by another status: the exclusive ends, the message counts.
+  // A status byte ends the exclusive message; the truncated message is counted.
   CHECK(read(reader, {0xf0, 1, 2, 0x90, 60, 100}).size() == 1);
 }
 
 namespace {
 
-// Hz, from the standard's own words: a semitone of equal temperament, and 1/16384 of one.
+// Frequency in Hz by the standard: a semitone of equal temperament and a fraction of 1/16384.
 double tuned_hz(int semitone, int fraction) {
   return 440.0 * std::pow(2.0, (semitone - 69.0 + fraction / 16384.0) / 12.0);
 }
@@ -124,7 +124,7 @@ Bytes dump_of_all_keys() {
 
 }  // namespace
 
-TEST_CASE("tunings of keys are read, in one packet or in several", "[midi]") {
+TEST_CASE("tuning messages are read, in one packet or several", "[midi]") {
   const Bytes change = {0xf0, 0x7f, 0x10, 0x08, 0x02, 5,  3,    60,   60,   64,
                         0,    61,   0x7f, 0x7f, 0x7f, 62, 0x7f, 0x7f, 0x7e, 0xf7};
   for (const std::size_t cut : {std::size_t{1}, std::size_t{7}, change.size()}) {
@@ -138,7 +138,7 @@ TEST_CASE("tunings of keys are read, in one packet or in several", "[midi]") {
       }
       read(reader, {0xf8});
     }
-    REQUIRE(events.size() == 2);  // all ones: as it was
+    REQUIRE(events.size() == 2);  // all ones: no change
     check_event(events[0], EventKind::key_tuning, 0, 60, tuned_hz(60, 8192));
     check_event(events[1], EventKind::key_tuning, 0, 62, tuned_hz(127, 16382));
     CHECK(events[0].value2 == 1.0);
@@ -153,7 +153,7 @@ TEST_CASE("tunings of keys are read, in one packet or in several", "[midi]") {
   CHECK(reader.malformed() == 0);
 }
 
-TEST_CASE("a tuning that is cut short, too long or altered is refused whole", "[midi]") {
+TEST_CASE("a truncated, overlong or damaged tuning message is rejected", "[midi]") {
   Bytes altered = dump_of_all_keys();
   altered[100] ^= 1;
   Bytes shorter = dump_of_all_keys();
@@ -171,7 +171,7 @@ TEST_CASE("a tuning that is cut short, too long or altered is refused whole", "[
     CHECK(reader.malformed() == 1);
     CHECK(read(reader, {0x90, 60, 100}).size() == 1);
   }
-  // Ended by another status, or of a kind that nothing here knows, however long.
+  // Ended by another status byte, or an unknown kind of any length.
   MidiReader reader;
   CHECK(read(reader, {0xf0, 0x7f, 0, 8, 2, 0, 1, 60, 60, 0, 0, 0x90, 60, 100}).size() == 1);
   Bytes unknown(100'000, 0x11);
@@ -181,7 +181,7 @@ TEST_CASE("a tuning that is cut short, too long or altered is refused whole", "[
   CHECK(reader.malformed() == 0);
 }
 
-TEST_CASE("what is cut short or unknown makes no event and is counted", "[midi]") {
+TEST_CASE("truncated and unknown messages make no event and are counted", "[midi]") {
   const std::vector<Bytes> wrong = {{0x90}, {0x90, 60}, {60},   {0xf4},
                                     {0xf5}, {0xe0, 1},  {0xd0}, {0xf2, 1}};
   for (const Bytes& bytes : wrong) {
@@ -189,7 +189,7 @@ TEST_CASE("what is cut short or unknown makes no event and is counted", "[midi]"
     CAPTURE(bytes);
     CHECK(read(reader, bytes).empty());
     CHECK(reader.malformed() == 1);
-    // And the next message is read as if nothing had been.
+    // The next message is read normally.
     CHECK(read(reader, {0x90, 60, 100}).size() == 1);
     CHECK(reader.malformed() == 1);
   }
@@ -201,7 +201,7 @@ TEST_CASE("what is cut short or unknown makes no event and is counted", "[midi]"
   CHECK(reader.malformed() == 1);
 }
 
-TEST_CASE("the chart has every controller that means something by itself", "[midi]") {
+TEST_CASE("the chart has every controller with a fixed meaning", "[midi]") {
   const auto state = [](const Channels& channels) {
     return std::vector<double>{channels.level(0),
                                channels.balance(0)[0],
@@ -216,7 +216,7 @@ TEST_CASE("the chart has every controller that means something by itself", "[mid
   for (int number = 0; number < 120; ++number) {
     Channels channels;
     channels.bend(0, 1.0);
-    channels.turn(0, 101, 0.0);  // the range of bends, for who enters data
+    channels.turn(0, 101, 0.0);  // bend range, for data entry
     channels.turn(0, 100, 0.0);
     const auto before = state(channels);
     channels.turn(0, number, 0.6);
@@ -234,7 +234,7 @@ TEST_CASE("the chart has every controller that means something by itself", "[mid
   CHECK(found >= 11);
 }
 
-TEST_CASE("random bytes in random packets only ever make events in range", "[midi]") {
+TEST_CASE("random bytes in random packets make only valid events", "[midi]") {
   support::Random random(99);
   MidiReader reader;
   std::size_t count = 0;
@@ -264,13 +264,13 @@ TEST_CASE("random bytes in random packets only ever make events in range", "[mid
   CHECK(read(reader, {0xf7, 0x90, 60, 100}).size() == 1);
 }
 
-TEST_CASE("an octave tuning is twelve numbers of cents for all keys", "[midi]") {
+TEST_CASE("an octave tuning sets twelve deviations in cents for all keys", "[midi]") {
   Bytes one = {0xf0, 0x7f, 0x7f, 0x08, 0x08, 0x03, 0x7f, 0x7f};
   Bytes two = {0xf0, 0x7e, 0x7f, 0x08, 0x09, 0x03, 0x7f, 0x7f};
   for (int step = 0; step < 12; ++step) {
-    one.push_back(static_cast<std::uint8_t>(64 - 5 * step));  // C as it is, C# 5 cents flat
+    one.push_back(static_cast<std::uint8_t>(64 - 5 * step));  // C unchanged, C# 5 cents flat
     two.push_back(static_cast<std::uint8_t>(64 + step));      // 100/64 cents each
-    two.push_back(64);                                        // and half of that
+    two.push_back(64);                                        // half of it
   }
   one.push_back(0xf7);
   two.push_back(0xf7);

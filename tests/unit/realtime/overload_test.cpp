@@ -1,5 +1,4 @@
-// More sound than there is time for: voices give way, the quietest first, by a clock that the test
-// turns by hand.
+// Overload: the quietest voices are stolen first. The test sets the clock.
 #include <unistd.h>
 
 #include <filesystem>
@@ -18,14 +17,14 @@ namespace {
 using namespace support;
 
 constexpr double rate = 44100.0;
-constexpr std::size_t block = 256;  // a span of its own: 5.8 ms
+constexpr std::size_t block = 256;  // a whole span: 5.8 ms
 constexpr double period_s = block / rate;
 constexpr std::size_t second = static_cast<std::size_t>(1.0 / period_s) + 1;  // in blocks
 
 constexpr int first_key = 50;
 constexpr int keys = 8;
 
-// A clock that stands still but for what a block is to take; it is read before and after each.
+// A clock that only advances by the duration of a block. It is read before and after each block.
 struct HandClock {
   static std::int64_t read() {
     now_ns += ++reads % 2 == 0 ? took_ns : 0;
@@ -36,7 +35,7 @@ struct HandClock {
   static inline std::size_t reads = 0;
 };
 
-// A process whose blocks take what the test says, and all that it has played.
+// A process whose blocks take the time that the test sets, with its output.
 struct Harness {
   explicit Harness(Process::Clock clock = &HandClock::read) : process(rate, false, clock) {
     offer(1);
@@ -53,7 +52,7 @@ struct Harness {
       process.from_osc.push({.event = note_on(0, key)});
     }
   }
-  // Shares of the period: what every block takes, and what each voice adds.
+  // As parts of the period: the time of each block, and the additional time of each voice.
   void run(std::size_t blocks, double fixed, double each = 0.0) {
     for (std::size_t n = 0; n < blocks; ++n) {
       const double share = fixed + each * process.meters().voices;
@@ -79,8 +78,8 @@ struct Harness {
   std::size_t heap_calls = 0;
 };
 
-// What DspLoad lets sound where a block takes `fixed` and `each` more for every voice, after so
-// many blocks; somebody plays all keys all the time.
+// The limits that DspLoad sets if a block takes `fixed`, and `each` more for every voice, while all
+// keys are played all the time.
 struct Played {
   int least = keys;
   int last = keys;
@@ -105,8 +104,8 @@ Played played(std::size_t blocks, double fixed, double each) {
 // --- who gives way
 // -------------------------------------------------------------------------------
 
-TEST_CASE("an engine keeps the loudest held voices, and the newest", "[overload]") {
-  // The newest is the quietest, the loudest is let go.
+TEST_CASE("an engine keeps the loudest held voices and the newest", "[overload]") {
+  // The newest voice is the quietest; the loudest is released.
   const double velocities[keys] = {0.9, 0.3, 0.6, 1.0, 0.2, 0.5, 0.8, 0.1};
   const auto notes = [&](const std::vector<int>& wanted) {
     std::vector<Event> events;
@@ -135,15 +134,15 @@ TEST_CASE("an engine keeps the loudest held voices, and the newest", "[overload]
   INFO(show(worst));
   CHECK(worst < 1e-12 * peak(expected.y()));
   CHECK(largest_step(std::span(player.y()).subspan(start - 1)) <
-        1.5 * largest_step(std::span(player.y()).first(start)));  // nothing clicks
+        1.5 * largest_step(std::span(player.y()).first(start)));  // no clicks
 
-  // A new note takes a voice's place, until there is room for all again.
+  // A new note steals a voice until there is time for all.
   player.run(256, {note_on(0, 70), note_on(10, 71)});
   CHECK(player.engine().meters().stepped == 3);
   player.engine().limit_voices(keys);
   player.run(1024, {note_on(0, 72), note_on(10, 73)});
   CHECK(player.engine().meters().stepped == 5);
-  player.engine().limit_voices(0);  // one at least: the newest
+  player.engine().limit_voices(0);  // at least one voice: the newest
   CHECK(player.engine().meters().stepped == 1);
   CHECK(player.heap_calls == 0);
 }
@@ -151,7 +150,8 @@ TEST_CASE("an engine keeps the loudest held voices, and the newest", "[overload]
 // --- how many
 // ------------------------------------------------------------------------------------
 
-TEST_CASE("the mean is over a second, and what lasts is the median of five", "[overload]") {
+TEST_CASE("the mean covers a second, and the lasting load is the median of five spans",
+          "[overload]") {
   DspLoad load;
   for (std::size_t n = 0; n < second; ++n) {
     load.add(0.5 * period_s, period_s);
@@ -167,7 +167,7 @@ TEST_CASE("the mean is over a second, and what lasts is the median of five", "[o
   CHECK(load.lasting() == Approx(0.5).epsilon(1e-12));
   load.add(100.0 * period_s, period_s);
   CHECK(load.lasting() == Approx(100.0).epsilon(1e-12));
-  // Short blocks are taken together until they make 5 ms: 16 frames are 0.36 ms.
+  // Short blocks are added up to 5 ms: 16 frames are 0.36 ms.
   load.forget();
   for (int n = 0; n < 14 * 6; ++n) {
     load.add(n % 14 == 0 ? 2e-3 : 1e-4, 16.0 / rate);
@@ -175,30 +175,30 @@ TEST_CASE("the mean is over a second, and what lasts is the median of five", "[o
   CHECK(load.lasting() == Approx((2e-3 + 13e-4) / (14 * 16.0 / rate)).epsilon(1e-12));
 }
 
-TEST_CASE("as many voices sound as there is time for", "[overload]") {
-  // 8 cost 1.68: three leave 0.63, which stays.
+TEST_CASE("voices are limited to those there is time for", "[overload]") {
+  // 8 voices take 1.68; three take 0.63 and stay.
   const Played heavy = played(10 * second, 0.0, 0.21);
   CHECK(heavy.last == 3);
   CHECK(heavy.changes == 1);
-  // 500 ms of 5: one remains, and at 12 it is more than there is, but less than eight.
+  // After 500 ms at 5 voices, one remains; at 12 even one is too much, but less than eight.
   CHECK(played(10 * second, 0.0, 12.0).last == 1);
-  // What fits is left alone.
+  // A load that fits is not reduced.
   CHECK(played(10 * second, 0.0, 0.11).changes == 0);
 }
 
-TEST_CASE("voices that cost nothing are not shed in vain", "[overload]") {
-  // Full, but it fits: the first attempt, which brings nothing, is the last.
+TEST_CASE("voices are not stolen if that does not lower the load", "[overload]") {
+  // Full, but it fits: after one attempt without effect there is no other.
   const Played full = played(10 * second, 0.95, 0.0);
   CHECK(full.changes == 1);
   CHECK(full.least == 6);
-  // Too much, whatever the voices do: they all come back, and are left alone for a while.
+  // Too much with any number of voices: all come back and stay for a while.
   const Played fixed = played(5 * second, 1.4, 0.0);
   CHECK(fixed.changes == 4);  // to 4, 2, 1, and back to all
   CHECK(fixed.least == 1);
   CHECK(fixed.last == keys);
 }
 
-TEST_CASE("what is over for a second lets more sound, by what they cost", "[overload]") {
+TEST_CASE("after a second of low load more voices may sound, by their cost", "[overload]") {
   DspLoad load;
   const auto run = [&](std::size_t blocks, double share, int sounding) {
     std::optional<int> said;
@@ -223,7 +223,7 @@ TEST_CASE("what is over for a second lets more sound, by what they cost", "[over
 // --- in the audio thread
 // -------------------------------------------------------------------------
 
-TEST_CASE("a process that takes too long sheds voices, tells it once, and recovers", "[overload]") {
+TEST_CASE("an overloaded process steals voices, reports it once, and recovers", "[overload]") {
   Harness harness;
   harness.strike_all();
   harness.run(second, 0.0, 0.05);
@@ -253,7 +253,7 @@ TEST_CASE("a process that takes too long sheds voices, tells it once, and recove
   CHECK(harness.heap_calls == 0);
 }
 
-TEST_CASE("a machine that holds up a block or two takes no voice", "[overload]") {
+TEST_CASE("one or two slow blocks steal no voice", "[overload]") {
   Harness harness;
   harness.strike_all();
   harness.run(second, 0.1);
@@ -271,13 +271,13 @@ TEST_CASE("a machine that holds up a block or two takes no voice", "[overload]")
   harness.process.meters_were_read.raise();
   harness.run(2, 0.1);
   CHECK(meters().cpu_peak == Approx(0.1).epsilon(1e-6));
-  // Three of five are more than a hiccup.
+  // Three of five spans are more than a hiccup.
   harness.run(3, 30.0);
   harness.run(2, 0.1);
   CHECK(meters().shed == keys - 1);
 }
 
-TEST_CASE("while two models fade into each other, the old one gives way", "[overload]") {
+TEST_CASE("during a crossfade an overload ends the old model first", "[overload]") {
   Harness harness;
   harness.strike_all();
   harness.run(second, 0.1);
@@ -291,7 +291,7 @@ TEST_CASE("while two models fade into each other, the old one gives way", "[over
   CHECK(harness.overloads().empty());
 }
 
-TEST_CASE("without a clock nothing is measured and nobody gives way", "[overload]") {
+TEST_CASE("without a clock the load is not measured and no voice is stolen", "[overload]") {
   const std::size_t reads = HandClock::reads;
   Harness harness(nullptr);
   harness.strike_all();
@@ -305,7 +305,8 @@ TEST_CASE("without a clock nothing is measured and nobody gives way", "[overload
 // --- what is told
 // --------------------------------------------------------------------------------
 
-TEST_CASE("a plan that one core has no time for says how many voices fit", "[overload]") {
+TEST_CASE("the warning about a plan too large for one core says how many voices fit",
+          "[overload]") {
   const auto plan = [](double share) {
     Plan made;
     made.parts.push_back({.predicted_ns = 0.25 * share * 1e9 / 48000.0});
@@ -331,11 +332,11 @@ TEST_CASE("a plan that one core has no time for says how many voices fit", "[ove
   CHECK_FALSE(overload_warning(plan(0.89), 64, 96000.0, Precision::float64).empty());
 }
 
-TEST_CASE("a session warns of a plan that is too much, and tells of an overload", "[overload]") {
+TEST_CASE("a session warns about a plan that is too large and reports an overload", "[overload]") {
   const auto folder =
       std::filesystem::temp_directory_path() / ("ressort-overload-" + std::to_string(getpid()));
   std::filesystem::create_directories(folder);
-  // Too many masses for modes, and a law in every link: 256 of them are some seconds a second.
+  // Too many masses for exact modes and a law in every link: 256 voices take seconds per second.
   std::ofstream(folder / "m.mdl") << "@s string 1500 1. 0.1 0.0001 0. 0.\n"
                                      "@in1 frcInput [@s 0.3]\n@out1 posOutput [@s 0.6]\n";
   std::ofstream(folder / "m.toml")
@@ -355,7 +356,7 @@ TEST_CASE("a session warns of a plan that is too much, and tells of an overload"
     CHECK((*loaded)->warnings[0].find("all 256 voices would take about ") == 0);
     CHECK((*loaded)->warnings[0].find(" fit; to lower the load, use -p ") != std::string::npos);
 
-    CHECK(session.status().cpu == -1.0);  // nothing runs
+    CHECK(session.status().cpu == -1.0);  // no backend runs
     Meters meters;
     meters.load = 0.25;
     meters.cpu_peak = 1.5;
@@ -367,7 +368,7 @@ TEST_CASE("a session warns of a plan that is too much, and tells of an overload"
     CHECK(now.cpu == 0.25);
     CHECK(now.cpu_peak == 1.5);
     CHECK(now.peak_db == Approx(20.0 * std::log10(0.5)));
-    // Who asks next sees the same peak, once; who has asked sees none.
+    // Each reader sees the peak once.
     CHECK(session.status(MeterReader::panel).cpu_peak == 1.5);
     CHECK(session.status(MeterReader::panel).cpu_peak == 0.0);
     CHECK(session.status(MeterReader::console).cpu_peak == 0.0);

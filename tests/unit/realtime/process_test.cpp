@@ -1,4 +1,4 @@
-// The audio thread's whole: events on their frames, models that change while they sound.
+// The whole audio thread: events at their frames, and models that change while they sound.
 #include <numbers>
 #include <set>
 
@@ -25,7 +25,7 @@ TEST_CASE("without a model there is silence", "[process]") {
   CHECK(peak(harness.out[1]) == 0.0);
 }
 
-TEST_CASE("MIDI acts on its exact frame, whatever the block", "[process]") {
+TEST_CASE("MIDI acts at its exact frame for any block length", "[process]") {
   const std::uint8_t on[] = {0x90, 69, 127};
   for (const std::size_t block : {64u, 333u, 512u, 2000u}) {
     for (const std::uint32_t frame : {0u, 1u, 33u, 63u}) {
@@ -41,9 +41,9 @@ TEST_CASE("MIDI acts on its exact frame, whatever the block", "[process]") {
   }
 }
 
-TEST_CASE("an event for a frame acts on it, and one that is late at once", "[process]") {
+TEST_CASE("an event acts at its frame, and a late event acts at once", "[process]") {
   Harness harness;
-  Preset faint;  // what drifts this far would be taken for a voice that lost its stability
+  Preset faint;  // a larger drift would look like an unstable voice
   faint.gain = 0x1p-10;
   harness.process.slot.offer(sounding(clock_text, faint, 1));
   harness.at(1717, push());
@@ -59,13 +59,13 @@ TEST_CASE("an event for a frame acts on it, and one that is late at once", "[pro
   CHECK(harness.process.meters().late_s == Approx(90.0 / rate).epsilon(1e-12));
 }
 
-TEST_CASE("events with a time keep one latency, however they come", "[process]") {
+TEST_CASE("events with a time have constant latency", "[process]") {
   Random random(5);
   for (int i = 0; i < 50; ++i) {
     Harness harness;
     harness.process.slot.offer(sounding(clock_text, Preset{}, 1));
     harness.run(256 * 4, 256);
-    // Played on a key during the last period, read at the start of this one.
+    // A key pressed during the last period, read at the start of this one.
     const std::size_t frame = 256 * 3 + random.below(256);
     const auto when = static_cast<std::int64_t>(static_cast<double>(frame) / rate * 1e9);
     harness.process.from_midi.push(
@@ -74,7 +74,7 @@ TEST_CASE("events with a time keep one latency, however they come", "[process]")
     CAPTURE(frame);
     CHECK(pushed_at(harness.y()) == frame + 256);
   }
-  // From before the last period: the first frame there is. From the future: within this block.
+  // Before the last period: at the first frame. In the future: within this block.
   for (const std::int64_t when : {std::int64_t{0}, std::int64_t{1000000000}}) {
     Harness harness;
     harness.process.slot.offer(sounding(clock_text, Preset{}, 1));
@@ -97,7 +97,7 @@ TEST_CASE("the events of a bundle act in one frame", "[process]") {
   CHECK(harness.y()[257] == 6.0);
 }
 
-TEST_CASE("what comes first acts first, and what finds no room is counted", "[process]") {
+TEST_CASE("events act in order of arrival, and rejected ones are counted", "[process]") {
   Harness harness;
   harness.process.slot.offer(sounding(hand_text, holding(), 1));
   for (const double target : {0.03, 0.04, 0.02}) {
@@ -120,12 +120,12 @@ TEST_CASE("what comes first acts first, and what finds no room is counted", "[pr
 // --- models that change
 // ---------------------------------------------------------------------------
 
-TEST_CASE("two models cross-fade in a straight line of 50 ms", "[process]") {
+TEST_CASE("two models crossfade linearly over 50 ms", "[process]") {
   for (const std::size_t block : {32u, 441u, 512u, 3000u}) {
     Harness harness;
     harness.process.slot.offer(constant("0.75"));
     harness.run(block, block);
-    CHECK(harness.y()[0] == 0.75);  // the first one is there at once
+    CHECK(harness.y()[0] == 0.75);  // the first model starts at once
     harness.out[0].clear();
     harness.process.slot.offer(constant("-0.25", 2));
     harness.run(4000, block);
@@ -140,12 +140,12 @@ TEST_CASE("two models cross-fade in a straight line of 50 ms", "[process]") {
   }
 }
 
-TEST_CASE("a note that began before the swap ends in the old model, a new one begins in the new",
+TEST_CASE("a note from before the swap ends in the old model, a new one starts in the new model",
           "[process]") {
   Harness harness;
   harness.process.slot.offer(sounding(hand_text, holding(), 1));
   harness.now(note_on(0, 60));
-  harness.run(10240);  // the hand has come to 1
+  harness.run(10240);  // the hand has reached 1
   harness.out[0].clear();
   harness.process.slot.offer(constant("0.", 2));
   harness.at(10240 + 500, note_off(0, 60));
@@ -159,7 +159,7 @@ TEST_CASE("a note that began before the swap ends in the old model, a new one be
   }
   INFO(show(worst));
   CHECK(worst < 1e-15);
-  CHECK(player.y()[12239] < 0.3);  // it did let go
+  CHECK(player.y()[12239] < 0.3);  // the key was released
 }
 
 TEST_CASE("an event for one model does not act in another", "[process]") {
@@ -179,14 +179,14 @@ TEST_CASE("an event for one model does not act in another", "[process]") {
                .model = 7,
                .value = 1.0});
   harness.run(256);
-  for (std::size_t n = 0; n < 256; ++n) {  // in the old one, which fades
+  for (std::size_t n = 0; n < 256; ++n) {  // in the old model, which fades
     CHECK(std::fabs(harness.y()[256 + n] - old_gain(n) * static_cast<double>(n + 1)) < 1e-12);
   }
 }
 
-TEST_CASE("a thousand models change under sounding notes without a step", "[process]") {
+TEST_CASE("a thousand changes of the model under sounding notes make no step", "[process]") {
   const std::string texts[] = {scenes::poly_triangle("0.0005"), ringing_string()};
-  // What each model does by itself with the same note.
+  // The steps of each model alone with the same note.
   double own_step = 0.0;
   double own_peak = 0.0;
   for (const std::string& text : texts) {
@@ -195,7 +195,7 @@ TEST_CASE("a thousand models change under sounding notes without a step", "[proc
     own_step = std::max(own_step, largest_step(player.y()));
     own_peak = std::max(own_peak, peak(player.y()));
   }
-  // And what takes DC away adds its own pole's share of a peak.
+  // The DC blocker adds its pole's share of a peak.
   const double bound = own_step + 2.0 * own_peak / static_cast<double>(fade_frames) +
                        2.0 * std::numbers::pi * DcBlocker::corner_hz / 44100.0 * own_peak;
 
@@ -236,7 +236,7 @@ TEST_CASE("a thousand models change under sounding notes without a step", "[proc
   CHECK(harness.heap_calls == 0);
 }
 
-TEST_CASE("an offer that comes too soon waits, and one that is replaced comes back", "[process]") {
+TEST_CASE("an early offer waits, and a replaced offer is returned", "[process]") {
   Harness harness;
   PlayingEngine* const first = constant("1.", 1);
   PlayingEngine* const second = constant("2.", 2);
@@ -253,7 +253,7 @@ TEST_CASE("an offer that comes too soon waits, and one that is replaced comes ba
   CHECK(harness.process.slot.collect() == nullptr);
   harness.run(10000);
   CHECK(harness.y().back() == 4.0);
-  // One place to put what has sounded: the second goes when the first was collected.
+  // There is one place for a returned engine: the second is returned once the first was collected.
   CHECK(harness.process.slot.collect() == first);
   delete first;
   harness.run(256);
@@ -264,7 +264,7 @@ TEST_CASE("an offer that comes too soon waits, and one that is replaced comes ba
 // --- what comes out
 // -------------------------------------------------------------------------------
 
-TEST_CASE("the length of the blocks does not change what leaves the limiter", "[process]") {
+TEST_CASE("the block length does not change the limiter's output", "[process]") {
   Preset loud = struck(4);
   loud.gain = 50.0;
   std::vector<double> expected;
@@ -285,7 +285,7 @@ TEST_CASE("the length of the blocks does not change what leaves the limiter", "[
   }
 }
 
-TEST_CASE("one output is heard on every channel, and too many are folded", "[process]") {
+TEST_CASE("one output plays on every channel, and too many are folded", "[process]") {
   Harness harness(false, 2);
   harness.process.slot.offer(constant("0.5"));
   harness.run(10);
@@ -301,7 +301,7 @@ TEST_CASE("one output is heard on every channel, and too many are folded", "[pro
   CHECK(folded.out[1][9] == 2.0);
 }
 
-TEST_CASE("single and double precision buffers carry the same", "[process]") {
+TEST_CASE("single and double precision buffers have the same content", "[process]") {
   Harness harness;
   Process process(rate, false);
   harness.process.slot.offer(sounding(ringing_string(), struck(1), 1));
@@ -317,7 +317,7 @@ TEST_CASE("single and double precision buffers carry the same", "[process]") {
   }
 }
 
-TEST_CASE("a recording is what was heard; a reset is told once", "[process]") {
+TEST_CASE("a recording equals the output; a reset is reported once", "[process]") {
   Harness harness(false, 2);
   harness.process.slot.offer(sounding(ringing_string(), struck(1), 1));
   harness.process.is_recording.raise();

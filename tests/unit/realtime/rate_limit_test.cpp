@@ -1,4 +1,4 @@
-// What is told of things that happen again and again.
+// Limits on repeated messages.
 #include "app/realtime/rate_limit.h"
 
 #include "tests/support/catch.h"
@@ -8,7 +8,7 @@ namespace ressort::rate_limit_test {
 
 using namespace std::chrono_literals;
 
-TEST_CASE("the first is told at once, the rest once an interval, and all are counted",
+TEST_CASE("the first message passes at once, later ones once an interval, and all are counted",
           "[rate_limit]") {
   RateLimit limit(5s);
   const RateLimit::Clock::time_point start = RateLimit::Clock::now();

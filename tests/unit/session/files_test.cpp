@@ -1,5 +1,4 @@
-// Files that are written: nothing that is read or was there is lost, whatever happens meanwhile,
-// and what is killed is still a sound.
+// Written files: inputs and existing files are never lost, and a killed recording is a sound file.
 #include "app/session/files.h"
 
 #include <signal.h>
@@ -39,7 +38,7 @@ std::string error_of(const Result<T>& result) {
   return result.error().message;
 }
 
-// A ramp that every format holds to one part in 2^15 or, where it loses something, about.
+// A ramp that lossless formats store exactly to one part in 2^15.
 std::vector<double> ramp(std::size_t frames) {
   std::vector<double> samples(2 * frames);
   for (std::size_t n = 0; n < frames; ++n) {
@@ -49,7 +48,7 @@ std::vector<double> ramp(std::size_t frames) {
   return samples;
 }
 
-// Files may not grow beyond so much while this lives.
+// Limits the size of files while this object lives.
 class FileLimit {
  public:
   explicit FileLimit(rlim_t bytes) : before_(signal(SIGXFSZ, SIG_IGN)) {
@@ -71,7 +70,7 @@ class FileLimit {
 
 }  // namespace
 
-TEST_CASE("a text takes its place when it is whole", "[files]") {
+TEST_CASE("a file gets its name when it is complete", "[files]") {
   const Folder folder;
   const std::string path = folder.write("a.txt", "old");
   chmod(path.c_str(), 0640);
@@ -93,7 +92,7 @@ TEST_CASE("a text takes its place when it is whole", "[files]") {
   CHECK((now.st_mode & 0777) == 0640);
 }
 
-TEST_CASE("a file that is there is not written over unasked", "[files]") {
+TEST_CASE("an existing file is not overwritten without --force", "[files]") {
   const Folder folder;
   const std::string path = folder.write("a.txt", "old");
   CHECK(has(error_of(write_text(path, "new", Existing::refuse)),
@@ -108,7 +107,7 @@ TEST_CASE("a file that is there is not written over unasked", "[files]") {
   CHECK(has(error_of(write_text(folder.file(""), "x", Existing::replace)), "is a folder"));
 }
 
-TEST_CASE("what a link leads to is replaced, not the link", "[files]") {
+TEST_CASE("a link's target is replaced, not the link", "[files]") {
   const Folder folder;
   folder.write("real.txt", "old");
   fs::create_symlink("real.txt", folder.file("link.txt"));
@@ -120,7 +119,7 @@ TEST_CASE("what a link leads to is replaced, not the link", "[files]") {
   CHECK(folder.text("later.txt") == "first");
 }
 
-TEST_CASE("what is read is known under every name", "[files]") {
+TEST_CASE("an input file is recognised by any of its names", "[files]") {
   const Folder folder;
   const std::string read[] = {"", folder.write("in.wav", "x")};
   fs::create_symlink("in.wav", folder.file("soft.wav"));
@@ -134,7 +133,7 @@ TEST_CASE("what is read is known under every name", "[files]") {
   CHECK(check_not_input(folder.write("same_text.wav", "x"), read));
 }
 
-TEST_CASE("a text that finds no room leaves what was there", "[files]") {
+TEST_CASE("a failed write keeps the old file", "[files]") {
   const Folder folder;
   const std::string path = folder.write("a.txt", "old");
   {
@@ -149,7 +148,7 @@ TEST_CASE("a text that finds no room leaves what was there", "[files]") {
   CHECK(fs::is_character_file("/dev/null"));
 }
 
-TEST_CASE("a byte order mark is passed over, UTF-16 is told", "[files]") {
+TEST_CASE("a byte order mark is skipped, and UTF-16 is an error", "[files]") {
   const Folder folder;
   const auto text = read_text(folder.write("a",
                                            "\xef\xbb\xbf"
@@ -163,7 +162,7 @@ TEST_CASE("a byte order mark is passed over, UTF-16 is told", "[files]") {
   }
 }
 
-TEST_CASE("the ending says what a sound file is", "[files]") {
+TEST_CASE("the ending selects the sound file type", "[files]") {
   const Folder folder;
   const std::vector<double> samples = ramp(4000);
   for (const std::string_view ending : sound_endings()) {
@@ -184,7 +183,7 @@ TEST_CASE("the ending says what a sound file is", "[files]") {
     }
     CHECK(worst <= (ending == ".ogg" ? 0.05 : 0x1p-23));
   }
-  // Each has the first bytes of its kind, none those of another.
+  // Each has the first bytes of its own type.
   CHECK(folder.text("a.wav").substr(0, 4) == "RIFF");
   CHECK(folder.text("a.flac").substr(0, 4) == "fLaC");
   CHECK(folder.text("a.ogg").substr(0, 4) == "OggS");
@@ -194,7 +193,7 @@ TEST_CASE("the ending says what a sound file is", "[files]") {
   CHECK(folder.text("a.caf").substr(0, 4) == "caff");
 }
 
-TEST_CASE("what a sound file cannot be is refused", "[files]") {
+TEST_CASE("impossible sound formats are rejected", "[files]") {
   const Folder folder;
   const auto refusal = [&](const std::string& name, const SoundForm& form) {
     return error_of(SoundWriter::open(folder.file(name), form, Existing::refuse));
@@ -209,7 +208,7 @@ TEST_CASE("what a sound file cannot be is refused", "[files]") {
   CHECK(folder.names().empty());
 }
 
-TEST_CASE("a sound is written over sounds and nothing else", "[files]") {
+TEST_CASE("a sound file overwrites only sound files", "[files]") {
   const Folder folder;
   const auto open = [&](const std::string& name) {
     return SoundWriter::open(folder.file(name), {}, Existing::replace);
@@ -229,7 +228,7 @@ TEST_CASE("a sound is written over sounds and nothing else", "[files]") {
   CHECK(folder.names() == Names{"poem.wav", "empty.wav", "old.wav"});
 }
 
-TEST_CASE("a WAV of unknown or great length may pass 4 GB", "[files]") {
+TEST_CASE("a WAV of unknown or great length can exceed 4 GB", "[files]") {
   const Folder folder;
   for (const std::optional<long long> frames : {std::optional<long long>(), {1LL << 32}}) {
     const std::string path = folder.file("a.wav");
@@ -243,8 +242,7 @@ TEST_CASE("a WAV of unknown or great length may pass 4 GB", "[files]") {
   }
 }
 
-TEST_CASE("a sound that finds no room says so at the write, and what came before can be kept",
-          "[files]") {
+TEST_CASE("a full disk is reported by the write, and the sound before it can be saved", "[files]") {
   const Folder folder;
   constexpr std::size_t block = 256;
   const std::vector<double> samples = ramp(block);
@@ -263,7 +261,7 @@ TEST_CASE("a sound that finds no room says so at the write, and what came before
     REQUIRE(file->salvage());
     const auto read = read_sound(path);
     REQUIRE(read);
-    if (ending != ".flac" && ending != ".ogg") {  // these hold some back
+    if (ending != ".flac" && ending != ".ogg") {  // these formats buffer data
       CHECK(read->channels[0].size() >= written);
       CHECK(read->channels[0].size() < written + block);
     }
@@ -272,7 +270,7 @@ TEST_CASE("a sound that finds no room says so at the write, and what came before
   CHECK(has(error_of(full), "No space left on device"));
 }
 
-TEST_CASE("what is killed is a sound as long as it was a second before", "[files]") {
+TEST_CASE("a killed recording is complete up to the last second", "[files]") {
   const Folder folder;
   constexpr std::size_t block = 480;
   constexpr std::size_t blocks = 60;
@@ -281,7 +279,7 @@ TEST_CASE("what is killed is a sound as long as it was a second before", "[files
   int told[2];
   REQUIRE(pipe(told) == 0);
   const pid_t child = fork();
-  if (child == 0) {  // writes a block every 20 ms until it is killed, and tells each
+  if (child == 0) {  // writes a block every 20 ms until it is killed, and reports each
     std::vector<SoundWriter> files;
     for (const char* name : names) {
       files.push_back(*SoundWriter::open(folder.file(name), {.is_shown = true}, Existing::refuse));
@@ -313,7 +311,7 @@ TEST_CASE("what is killed is a sound as long as it was a second before", "[files
   }
 }
 
-TEST_CASE("a sound is read from an ordinary file", "[files]") {
+TEST_CASE("a sound is read from a regular file", "[files]") {
   const Folder folder;
   REQUIRE(mkfifo(folder.file("pipe.wav").c_str(), 0600) == 0);
   CHECK(has(error_of(SoundReader::open(folder.file("pipe.wav"))), "is not a regular file"));
@@ -323,7 +321,7 @@ TEST_CASE("a sound is read from an ordinary file", "[files]") {
             "is not a readable sound file"));
 }
 
-TEST_CASE("a preset reads several models as one, and says in which a mistake is", "[files]") {
+TEST_CASE("a preset joins several models, and an error names the right file", "[files]") {
   const Folder folder;
   const std::string box = "@box body 40. bridge\n@box_1 mode @box 100. 0.5 1.\n";
   folder.write("string.mdl",

@@ -1,4 +1,4 @@
-// What was played, played back: the same samples, bit by bit.
+// A flight reproduces the same samples, bit by bit.
 #include <unistd.h>
 
 #include <array>
@@ -30,7 +30,7 @@ struct Folder {
   }
 };
 
-// A session whose audio thread is this one, and all that it has played.
+// A session whose audio thread is this one, with its output.
 struct Stage {
   explicit Stage(const SessionOptions& options = {.compile = {.rate_hz = rate_hz},
                                                   .keeps_flights = true},
@@ -80,7 +80,7 @@ std::vector<float> played_back(const std::string& path, double heard_s = 1e6) {
   return all;
 }
 
-// The end of what was heard, as long as what was played back; all of it if that began late.
+// Compares the end of the output with the reproduced part.
 void check_same(const std::vector<float>& heard, const std::vector<float>& again) {
   REQUIRE(again.size() <= heard.size());
   REQUIRE(!again.empty());
@@ -90,12 +90,12 @@ void check_same(const std::vector<float>& heard, const std::vector<float>& again
   for (const float sample : again) {
     peak = std::max(peak, std::fabs(sample));
   }
-  CHECK(peak > 1e-3f);  // silence would be the same, too
+  CHECK(peak > 1e-3f);  // silence would be equal too
 }
 
 }  // namespace
 
-TEST_CASE("A flight plays the same samples once more", "[flight]") {
+TEST_CASE("A flight reproduces the same samples", "[flight]") {
   const Folder folder;
   Stage stage;
   stage.load("PolyTriangle");
@@ -118,7 +118,7 @@ TEST_CASE("A flight plays the same samples once more", "[flight]") {
   stage.load("BowedString");
   stage.play(14400, {{0x90, 45, 110}, {0xd0, 100}}, 1024);
   stage.load("20x30mesh");
-  stage.play(1024);  // in the midst of the fade
+  stage.play(1024);  // in the middle of the fade
   stage.load("PolyTriangle");
   stage.play(7168);
   stage.play(12032, {{0x90, 60, 127}, {0xb0, 64, 127}, {0x80, 60, 0}});
@@ -127,24 +127,24 @@ TEST_CASE("A flight plays the same samples once more", "[flight]") {
   INFO((written ? "" : written.error().message));
   REQUIRE(written);
   check_same(stage.heard, played_back(path));
-  SECTION("and the last of them, the rest being computed only") {
+  SECTION("and only its end, the rest being computed silently") {
     const auto last = played_back(path, 0.25);
     CHECK(last.size() == 2 * 12000);
     check_same(stage.heard, last);
   }
-  SECTION("whatever became of the files, and as text that reads back as the same") {
+  SECTION("from its own texts, also printed and parsed again") {
     const auto text = read_text(path, max_flight_bytes);
     REQUIRE(text);
     const auto flight = parse_flight(*text);
     REQUIRE(flight);
     CHECK(print_flight(*flight) == *text);
   }
-  SECTION("but nothing is written over") {
+  SECTION("but never overwrites a file") {
     CHECK(!stage.session.write_flight(path, Existing::refuse));
   }
 }
 
-// What the fake clock says that a block has taken, in ns.
+// Duration of a block by the fake clock, in ns.
 std::int64_t block_takes_ns = 0;
 std::int64_t fake_clock_ns() {
   static std::int64_t now_ns = 0;
@@ -152,7 +152,7 @@ std::int64_t fake_clock_ns() {
   return now_ns;
 }
 
-TEST_CASE("A flight has the voices that gave way for want of time", "[flight]") {
+TEST_CASE("A flight reproduces voices stolen by an overload", "[flight]") {
   const Folder folder;
   block_takes_ns = 0;
   Stage stage({.compile = {.rate_hz = rate_hz}, .keeps_flights = true}, fake_clock_ns);
@@ -164,11 +164,11 @@ TEST_CASE("A flight has the voices that gave way for want of time", "[flight]") 
   }
   stage.play(4864, chord);
   const int before = stage.process.meters().voices;
-  block_takes_ns = 10'000'000;  // a block of 5.3 ms
+  block_takes_ns = 10'000'000;  // for a block of 5.3 ms
   stage.play(19200);
   CHECK(stage.process.meters().shed > 0);
   CHECK(stage.process.meters().voices < before);
-  // The old model goes at once, in the midst of its fade.
+  // The old model ends at once, in the middle of its fade.
   block_takes_ns = 0;
   stage.play(9600, chord);
   stage.load("BowedString");
@@ -185,7 +185,7 @@ TEST_CASE("A flight has the voices that gave way for want of time", "[flight]") 
   check_same(stage.heard, played_back(path));
 }
 
-TEST_CASE("A flight has programs that let the last one ring", "[flight]") {
+TEST_CASE("A flight reproduces program changes that let the last model ring", "[flight]") {
   const Folder folder;
   Stage stage;
   stage.load("PolyTriangle");
@@ -205,9 +205,9 @@ TEST_CASE("A flight has programs that let the last one ring", "[flight]") {
   check_same(stage.heard, played_back(path));
 }
 
-// Each of two that share the notes has recorded all of them, and plays its own: what one leaves out
-// the other one has, from one instrument to the next.
-TEST_CASE("A flight of one that shares the notes plays its own of them", "[flight]") {
+// Of two programs that share notes, each records all notes and plays its own part, from one
+// instrument to the next.
+TEST_CASE("A flight of a program that shares the notes plays its own part", "[flight]") {
   const Folder folder;
   std::vector<float> sounds[3];
   for (int number = 0; number <= 2; ++number) {
@@ -234,7 +234,7 @@ TEST_CASE("A flight of one that shares the notes plays its own of them", "[fligh
   CHECK(sounds[1] != sounds[2]);
 }
 
-TEST_CASE("A flight has the texts as they were when they were played", "[flight]") {
+TEST_CASE("A flight has the texts of the time when they were played", "[flight]") {
   const Folder folder;
   const std::string model =
       "@K param 0.1\n@s ground 0.\n@m mass 1. 0. 0.\n@r springDamper @s @m K 0.0005\n"
@@ -252,7 +252,7 @@ TEST_CASE("A flight has the texts as they were when they were played", "[flight]
   Stage stage(options);
   stage.load(preset);
   stage.play(4800, {{0x90, 57, 100}});
-  // A mass twice as heavy, while it sounds; a parameter; then another structure.
+  // A mass twice as heavy while it sounds; a parameter; then another structure.
   const auto edit = [&](const std::string& text) {
     const std::uint64_t before = stage.session.last_reload().count;
     folder.write("m.mdl", text);
@@ -276,7 +276,7 @@ TEST_CASE("A flight has the texts as they were when they were played", "[flight]
   check_same(stage.heard, played_back(path));
 }
 
-TEST_CASE("What is no flight is refused with its line", "[flight]") {
+TEST_CASE("An invalid flight is rejected with its line", "[flight]") {
   const auto error_of = [](const std::string& text) {
     const auto flight = parse_flight(text);
     REQUIRE(!flight);
@@ -299,7 +299,7 @@ TEST_CASE("What is no flight is refused with its line", "[flight]") {
   CHECK(error_of("ressort flight 1\nend 5\n") == "2: the flight has no engines or no events");
 }
 
-TEST_CASE("Nothing has flown before something sounds", "[flight]") {
+TEST_CASE("There is no flight before something sounds", "[flight]") {
   const Folder folder;
   Stage stage;
   const auto written =
@@ -308,7 +308,7 @@ TEST_CASE("Nothing has flown before something sounds", "[flight]") {
   CHECK(written.error().message == "nothing has been played yet");
 }
 
-TEST_CASE("Every preset flies", "[.][flights_everywhere]") {
+TEST_CASE("Every preset's flight reproduces its samples", "[.][flights_everywhere]") {
   for (const std::string& preset : known_presets()) {
     CAPTURE(preset);
     const Folder folder;

@@ -1,4 +1,4 @@
-// What a player changes is learnt, taken back and kept.
+// A player's changes: learned controllers, undo and saving.
 #include <chrono>
 #include <cmath>
 #include <thread>
@@ -10,7 +10,7 @@
 namespace ressort::keeping_test {
 namespace {
 
-// Until it is so, or two seconds have passed.
+// Waits until the condition holds, at most two seconds.
 bool comes_true(Harness& harness, const std::function<bool()>& is_so) {
   for (int i = 0; i < 200 && !is_so(); ++i) {
     harness.play();
@@ -42,7 +42,7 @@ struct LoadedHarness {
 
 }  // namespace
 
-TEST_CASE("a parameter learns the knob that moves, and forgets it", "[keeping]") {
+TEST_CASE("a parameter learns the next knob that moves, and forgets it", "[keeping]") {
   LoadedHarness fixture;
   Harness& h = fixture.harness;
   turn(h, 20, 0.9);  // before anybody asked
@@ -50,7 +50,7 @@ TEST_CASE("a parameter learns the knob that moves, and forgets it", "[keeping]")
   turn(h, 21, 0.25);
   REQUIRE(comes_true(h, [&] { return h.session.learned().size() == 1; }));
   CHECK(h.session.learned()[0].controller == 21);
-  // From 0.01 to 0.2 equal turns are equal ratios: half of it is the root of 0.01 * 0.2.
+  // From 0.01 to 0.2 in equal ratios: half way is the root of 0.01 * 0.2.
   turn(h, 21, 0.5);
   const double middle = std::sqrt(0.01 * 0.2);
   CHECK(comes_true(
@@ -67,7 +67,10 @@ TEST_CASE("a parameter learns the knob that moves, and forgets it", "[keeping]")
   CHECK(has(h.say("learn m_Q"), "did you mean 'm_K'?"));
 }
 
-TEST_CASE("what was learnt and set is saved, loaded and never written over unasked", "[keeping]") {
+TEST_CASE(
+    "learned controllers and values are saved and loaded, and presets are not overwritten without "
+    "--force",
+    "[keeping]") {
   LoadedHarness fixture;
   Harness& h = fixture.harness;
   h.say("learn m_K");
@@ -82,20 +85,20 @@ TEST_CASE("what was learnt and set is saved, loaded and never written over unask
     CHECK(has(h.say("save " + std::string(name)), "error"));
   }
   const auto known = known_presets();
-  // Behind the program's own, whose places in the list stay.
+  // After the program's presets, whose numbers stay.
   CHECK(known == std::vector<std::string>{"tri", "my own"});
   h.say("set m_K 0.1");
   CHECK(has(h.say("load \"MY OWN\""), "my own: 3 masses"));
   h.play();
   CHECK(*h.session.parameter("m_K") == 0.125);
-  CHECK(h.session.learned().empty());  // it is the preset's own now
+  CHECK(h.session.learned().empty());  // now it is the preset's own control
   turn(h, 33, 1.0);
   CHECK(comes_true(h, [&] { return h.session.parameter("m_K") == 0.2; }));
-  // OSC may load what the user has saved, too.
+  // OSC may load the user's presets too.
   CHECK(find_scene("my own", Reach::own_folders));
 }
 
-TEST_CASE("a model without a preset is saved as one", "[keeping]") {
+TEST_CASE("a model without a preset is saved as a preset", "[keeping]") {
   LoadedHarness fixture;
   Harness& h = fixture.harness;
   const std::string model = fixture.folder.write("bell.mdl", scenes::poly_triangle());
@@ -110,7 +113,7 @@ TEST_CASE("a model without a preset is saved as one", "[keeping]") {
   CHECK(h.session.current()->model_path == model);
 }
 
-TEST_CASE("undo takes back a change, a sweep, a load, and itself", "[keeping]") {
+TEST_CASE("undo reverts a change, a sweep, a load, and itself", "[keeping]") {
   LoadedHarness fixture;
   Harness& h = fixture.harness;
   CHECK(has(h.say("undo"), "nothing to take back"));
@@ -127,18 +130,18 @@ TEST_CASE("undo takes back a change, a sweep, a load, and itself", "[keeping]") 
   CHECK(*h.session.parameter("m_K") == 0.16);
 }
 
-TEST_CASE("names are found in any case, and near ones are told", "[keeping]") {
+TEST_CASE("names are found in any case, and similar ones are suggested", "[keeping]") {
   LoadedHarness fixture;
   Harness& h = fixture.harness;
   CHECK(has(h.say("LOAD TRI"), "tri: 3 masses"));
   CHECK(has(h.say("load tir"), "did you mean 'tri'?"));
   CHECK(has(h.say("get M_K"), "m_K = 0.1"));
-  CHECK(has(h.say("get k_M"), "did you mean 'm_K'?") == false);  // as far off as anything
+  CHECK(has(h.say("get k_M"), "did you mean 'm_K'?") == false);  // too far off for a suggestion
   CHECK(has(h.say("stauts"), "did you mean 'status'?"));
   CHECK(has(h.say("presets"), "three masses, struck"));
 }
 
-TEST_CASE("waiting ends with the program", "[keeping]") {
+TEST_CASE("waiting ends when the program ends", "[keeping]") {
   LoadedHarness fixture;
   Harness& h = fixture.harness;
   CHECK(h.say("wait 0.01").empty());
@@ -149,7 +152,7 @@ TEST_CASE("waiting ends with the program", "[keeping]") {
   ending.join();
 }
 
-TEST_CASE("status tells the last notes and a level", "[keeping]") {
+TEST_CASE("status shows the last notes and a level", "[keeping]") {
   LoadedHarness fixture;
   Harness& h = fixture.harness;
   CHECK(has(h.say("status"), "none yet"));
@@ -161,7 +164,7 @@ TEST_CASE("status tells the last notes and a level", "[keeping]") {
   CHECK(has(h.said, "[#"));
 }
 
-TEST_CASE("a word near to another is found by its letters", "[keeping]") {
+TEST_CASE("similar words are found by their letters", "[keeping]") {
   const std::vector<std::string> known = {"load", "status", "PolyTriangle"};
   CHECK(nearest_word("LAOD", known) == "load");
   CHECK(nearest_word("polytrangle", known) == "PolyTriangle");
@@ -170,7 +173,7 @@ TEST_CASE("a word near to another is found by its letters", "[keeping]") {
   CHECK(did_you_mean("statu", known) == "; did you mean 'status'?");
 }
 
-TEST_CASE("lines are broken at blanks, under their column", "[keeping]") {
+TEST_CASE("lines are wrapped at spaces and indented to their column", "[keeping]") {
   CHECK(wrapped("one two three", 20) == "one two three");
   CHECK(wrapped("one two three", 8) == "one two\nthree");
   CHECK(wrapped("a   one two three", 11) == "a   one two\n    three");

@@ -1,4 +1,4 @@
-// The modes of what sounds, from the console: listed, tuned, taken back, kept.
+// Modes of the playing scene, from the console: listed, tuned, undone, saved.
 #include <cstdlib>
 
 #include "app/session/files.h"
@@ -13,7 +13,7 @@ const char* const string_text =
     "@k param 0.1\n@s string 40 1. k 0.0005 0. 0.\n@in1 frcInput [@s 0.3]\n"
     "@out1 posOutput [@s 0.71]\n";
 
-// The user's cache is below the data folder while a test runs.
+// The user's cache is below the data folder during a test.
 struct CachedData : DataFolder {
   CachedData() { setenv("XDG_CACHE_HOME", cache().c_str(), 1); }
   ~CachedData() { unsetenv("XDG_CACHE_HOME"); }
@@ -44,7 +44,7 @@ TEST_CASE("notes and their frequencies", "[modes_told]") {
   }
 }
 
-TEST_CASE("a mode is tuned, taken back and kept", "[modes_told]") {
+TEST_CASE("a mode is tuned, undone and saved", "[modes_told]") {
   const CachedData folder;
   Harness harness;
   const std::string path = folder.written("mine.mdl", string_text);
@@ -68,8 +68,7 @@ TEST_CASE("a mode is tuned, taken back and kept", "[modes_told]") {
   CHECK(harness.say("modes 1").find("220.000") != std::string::npos);
 }
 
-TEST_CASE("modes that took a while are kept for the same text, numbers and version",
-          "[modes_told]") {
+TEST_CASE("slowly found modes are cached for the same text, values and version", "[modes_told]") {
   const CachedData folder;
   const std::string cache = folder.cache();
   const std::string path =
@@ -93,16 +92,16 @@ TEST_CASE("modes that took a while are kept for the same text, numbers and versi
   const auto second = known_modes(*scene, start_values(*scene), {});
   REQUIRE(second);
   CHECK(to_json(*first) == to_json(*second));
-  // It is that file which is read: what stands in it is what is told.
+  // The file is read: its content is reported.
   const std::string kept = *read_text(files()[0].string(), 1u << 30);
   KnownModes fewer = *first;
   fewer.modes.resize(3);
   std::ofstream(files()[0]) << to_json(fewer);
   CHECK(known_modes(*scene, start_values(*scene), {})->modes.size() == 3);
-  // And what is no such text is found anew.
+  // An invalid file is replaced.
   std::ofstream(files()[0]) << kept.substr(0, kept.size() / 2);
   CHECK(to_json(*known_modes(*scene, start_values(*scene), {})) == to_json(*first));
-  // Another number is another network.
+  // Another value is another network.
   const auto other = known_modes(*scene, {0.11}, {});
   REQUIRE(other);
   CHECK(other->modes[3].frequency_hz > first->modes[3].frequency_hz);

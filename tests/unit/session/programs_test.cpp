@@ -1,4 +1,4 @@
-// Program changes: from the bytes of a keyboard to the preset that sounds.
+// Program changes, from MIDI bytes to the playing preset.
 #include <chrono>
 #include <mutex>
 #include <thread>
@@ -23,7 +23,7 @@ std::string preset(const std::string& name) {
          "\"\n[[control]]\nfrom = \"note\"\nto = \"in1\"\nhow = \"impulse\"\nrange = [0.0, 0.1]\n";
 }
 
-// Plays `frames` with these bytes in the first of them; the calls of the heap meanwhile.
+// Plays `frames` with these bytes in the first. Returns the number of heap calls meanwhile.
 std::size_t play(support::Harness& harness, std::size_t frames,
                  const std::vector<std::uint8_t>& bytes = {}) {
   std::size_t calls = 0;
@@ -60,7 +60,7 @@ std::vector<Report> reports_of(const std::vector<std::vector<std::uint8_t>>& pac
 
 }  // namespace
 
-TEST_CASE("a program is counted from its channel's bank on", "[programs]") {
+TEST_CASE("program numbers count from the channel's bank", "[programs]") {
   const auto found = reports_of({{0xc0, 5},
                                  {0xb1, 0, 1},
                                  {0xb1, 32, 2},
@@ -76,10 +76,10 @@ TEST_CASE("a program is counted from its channel's bank on", "[programs]") {
   for (const Report& report : found) {
     CHECK(report.kind == Report::Kind::program);
   }
-  CHECK(reports_of({{0xc4, 5}}, 0x000f).empty());  // a channel that nobody listens to
+  CHECK(reports_of({{0xc4, 5}}, 0x000f).empty());  // a channel that is not received
 }
 
-TEST_CASE("what channels have been told holds for the next model", "[programs]") {
+TEST_CASE("channel settings are kept for the next model", "[programs]") {
   const auto loudness = [](const std::vector<std::uint8_t>& bytes) {
     support::Harness harness;
     harness.process.slot.offer(sounding(ringing_string(), struck(2), 1));
@@ -97,8 +97,7 @@ TEST_CASE("what channels have been told holds for the next model", "[programs]")
   CHECK(loudness({0xb1, 7, 50}) == Approx(full));
 }
 
-TEST_CASE("what rings goes on as if nothing had been loaded, until the next but one",
-          "[programs]") {
+TEST_CASE("a ringing model is unchanged by a load, and fades at the second one", "[programs]") {
   const std::vector<std::uint8_t> strike = {0x90, 60, 127};
   const auto played = [&](std::vector<std::size_t> swaps, bool lets_ring) {
     support::Harness harness;
@@ -118,7 +117,7 @@ TEST_CASE("what rings goes on as if nothing had been loaded, until the next but 
   const std::vector<double> alone = played({}, false);
   CHECK(peak(std::span(alone).subspan(20000)) > 1e-3);
   CHECK(played({2560}, true) == alone);
-  // A load fades it in 50 ms; so does a second change, from its own frame on.
+  // A load fades the ringing model in 50 ms, and so does a second program change.
   const auto faded = played({2560}, false);
   CHECK(peak(std::span(faded).subspan(2560 + fade_frames)) == 0.0);
   const auto twice = played({2560, 12800}, true);
@@ -130,7 +129,7 @@ TEST_CASE("what rings goes on as if nothing had been loaded, until the next but 
   CHECK(peak(std::span(twice).subspan(12800 + fade_frames)) == 0.0);
 }
 
-TEST_CASE("a note that is held ends by its key in the model that it began in", "[programs]") {
+TEST_CASE("a held note is released in the model that it began in", "[programs]") {
   support::Harness harness;
   harness.process.slot.offer(sounding(hand_text, holding(), 1));
   play(harness, 2560, {0x90, 60, 127});
@@ -143,8 +142,9 @@ TEST_CASE("a note that is held ends by its key in the model that it began in", "
   CHECK(harness.y().back() == Approx(0.0).margin(1e-6));
 }
 
-TEST_CASE("a program change loads the preset of its place, and unknown ones are told once",
-          "[programs]") {
+TEST_CASE(
+    "a program change loads the preset with its number, and unknown numbers are reported once",
+    "[programs]") {
   DataFolder data;
   data.write("models/m.mdl", model_text);
   for (const char* const name : {"Alpha", "Beta", "Gamma"}) {

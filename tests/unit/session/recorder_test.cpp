@@ -1,4 +1,4 @@
-// Recordings, by the console's `rec`, their only door.
+// Recordings by the console command `rec`.
 #include <signal.h>
 #include <sys/resource.h>
 
@@ -9,7 +9,7 @@
 
 namespace ressort::recorder_test {
 
-TEST_CASE("rec writes what is heard, frame by frame", "[recorder]") {
+TEST_CASE("rec records the output frame by frame", "[recorder]") {
   const Folder folder;
   const std::string path = folder.file("take.wav");
   Harness harness;
@@ -42,7 +42,7 @@ TEST_CASE("rec writes what is heard, frame by frame", "[recorder]") {
   CHECK(has(harness.say("rec stop"), "error: nothing is being recorded"));
 }
 
-TEST_CASE("a recording begins where it is told to, with the channels there are", "[recorder]") {
+TEST_CASE("a recording starts at the command, with the actual channels", "[recorder]") {
   const Folder folder;
   Harness harness(4);
   harness.process.is_recording.raise();  // left over in the ring
@@ -68,7 +68,7 @@ TEST_CASE("a recording of nothing is a valid file", "[recorder]") {
   CHECK(sound->channels[0].empty());
 }
 
-TEST_CASE("what a recording misses is told", "[recorder]") {
+TEST_CASE("a recording reports lost chunks", "[recorder]") {
   const Folder folder;
   Harness harness;
   harness.say("rec " + folder.file("gap.wav"));
@@ -79,7 +79,7 @@ TEST_CASE("what a recording misses is told", "[recorder]") {
   CHECK(has(harness.say("rec stop"), "gap.wav: 0.01 s, 3 pieces lost"));
 }
 
-TEST_CASE("a file that cannot be written is told at once", "[recorder]") {
+TEST_CASE("an unwritable file is reported at once", "[recorder]") {
   const Folder folder;
   Harness harness;
   CHECK(has(harness.say("rec " + folder.file("none/x.wav")), "x.wav' cannot be written"));
@@ -87,7 +87,7 @@ TEST_CASE("a file that cannot be written is told at once", "[recorder]") {
   CHECK(has(harness.say("rec stop"), "error: nothing is being recorded"));
 }
 
-TEST_CASE("rec writes over a sound when it is told to, over other files never", "[recorder]") {
+TEST_CASE("rec overwrites a sound with --force, and other files never", "[recorder]") {
   const Folder folder;
   Harness harness;
   const std::string path = folder.file("take.wav");
@@ -97,7 +97,7 @@ TEST_CASE("rec writes over a sound when it is told to, over other files never", 
   CHECK(has(harness.say("rec " + path), "take.wav' exists already; --force overwrites it"));
   CHECK(has(harness.say("rec " + path + " --force"), "recording to"));
   harness.play(50);
-  CHECK(read_sound(path)->channels[0].size() == 100);  // until the new one is whole
+  CHECK(read_sound(path)->channels[0].size() == 100);  // until the new one is complete
   harness.say("rec stop");
   CHECK(read_sound(path)->channels[0].size() == 50);
   CHECK(has(harness.say("rec " + folder.write("poem.wav", "text") + " --force"),
@@ -105,7 +105,7 @@ TEST_CASE("rec writes over a sound when it is told to, over other files never", 
   CHECK(has(harness.say("rec " + folder.file("take.mp4")), "has no known sound file ending"));
 }
 
-TEST_CASE("rec writes what the ending says", "[recorder]") {
+TEST_CASE("rec writes the file type of the ending", "[recorder]") {
   const Folder folder;
   Harness harness;
   for (const std::string_view ending : sound_endings()) {
@@ -121,8 +121,7 @@ TEST_CASE("rec writes what the ending says", "[recorder]") {
   }
 }
 
-TEST_CASE("a recording that finds no room is told of at once, and the sound goes on",
-          "[recorder]") {
+TEST_CASE("a full disk ends a recording at once, and the sound continues", "[recorder]") {
   const Folder folder;
   Harness harness;
   harness.say("load " + write_triangle(folder));
@@ -145,7 +144,7 @@ TEST_CASE("a recording that finds no room is told of at once, and the sound goes
   CHECK(harness.loudest(20) > 0.0);
   const auto sound = read_sound(path);
   REQUIRE(sound);
-  CHECK(sound->channels[0].size() > 6000);  // of the 6826 that have room
+  CHECK(sound->channels[0].size() > 6000);  // of the 6826 that fit
   CHECK(sound->channels[0].size() <= 6826);
   CHECK_FALSE(has(harness.say("status"), "recording"));
   CHECK(harness.say("rec stop") == "error: " + told + "\n");
@@ -153,7 +152,7 @@ TEST_CASE("a recording that finds no room is told of at once, and the sound goes
   CHECK(has(harness.say("rec " + folder.file("next.wav")), "recording to"));
 }
 
-TEST_CASE("a recording that is left alone ends with the console", "[recorder]") {
+TEST_CASE("an unfinished recording ends with the console", "[recorder]") {
   const Folder folder;
   {
     Harness harness;

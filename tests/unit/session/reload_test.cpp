@@ -1,4 +1,5 @@
-// What sounds is read again when its files change, as editors change them.
+// The playing scene is reloaded when its files change, in all the ways in which editors change
+// them.
 #include <unistd.h>
 
 #include <chrono>
@@ -34,7 +35,7 @@ struct Folder {
   }
 };
 
-// A mass on a spring that swings at 7 kHz sqrt(K/M), struck by a key and heard where it is.
+// A mass on a spring with 7 kHz sqrt(K/M), struck by a key; its position is the output.
 std::string model_text(const std::string& stiffness = "0.01", const std::string& mass = "1.",
                        const std::string& more = "") {
   return "@K param " + stiffness + "\n@s ground 0.\n@m mass " + mass +
@@ -74,7 +75,7 @@ struct Stage {
   }
   void strike(int key = 60) { play(64, {0x90, static_cast<std::uint8_t>(key), 127}); }
 
-  // What was said of a change of the files.
+  // Returns the report on a change of the files.
   Reload after(const std::function<void()>& change) {
     const std::uint64_t before = session.last_reload().count;
     change();
@@ -88,7 +89,7 @@ struct Stage {
     return news;
   }
 
-  // Of the last so many frames, by their upward crossings of zero.
+  // Frequency of the last frames, from the upward zero crossings.
   double frequency_hz(std::size_t frames) const {
     double first = 0.0;
     double last = 0.0;
@@ -110,8 +111,8 @@ struct Stage {
     }
     return most;
   }
-  // The largest second difference: what a click raises, and a sine of amplitude A and frequency w
-  // per sample keeps below A w^2.
+  // The largest second difference. A click raises it; a sine of amplitude A and frequency w per
+  // sample keeps it below A w^2.
   double largest_bend(std::size_t frames) const {
     double most = 0.0;
     for (std::size_t n = heard.size() - frames + 2; n < heard.size(); ++n) {
@@ -126,7 +127,7 @@ struct Stage {
   std::vector<double> heard;
 };
 
-// At rest in the published scheme: 2 asin(sqrt(K/M)/2) a sample at 44100 Hz.
+// The scheme's frequency: 2 asin(sqrt(K/M)/2) per sample at 44100 Hz.
 double pitch_hz(double stiffness, double mass) {
   return 44100.0 / M_PI * std::asin(0.5 * std::sqrt(stiffness / mass));
 }
@@ -138,7 +139,7 @@ bool has(const std::string& text, const std::string& part) {
 
 }  // namespace
 
-TEST_CASE("An edited parameter reaches the voice that sounds", "[reload]") {
+TEST_CASE("An edited parameter reaches the sounding voice", "[reload]") {
   const Folder folder;
   folder.write("m.mdl", model_text("0.01"));
   Stage stage(folder.write("p.toml", preset()));
@@ -159,7 +160,7 @@ TEST_CASE("An edited parameter reaches the voice that sounds", "[reload]") {
   CHECK(stage.session.parameter("K") == 0.012);
 }
 
-TEST_CASE("A number in the midst of the model reaches the voice that sounds", "[reload]") {
+TEST_CASE("An edited number in the model reaches the sounding voice", "[reload]") {
   const Folder folder;
   folder.write("m.mdl", model_text("0.01", "1."));
   Stage stage(folder.write("p.toml", preset()));
@@ -177,7 +178,7 @@ TEST_CASE("A number in the midst of the model reaches the voice that sounds", "[
   CHECK(stage.peak(4096) == Approx(before).epsilon(0.2));
   CHECK(stage.largest_bend(4800) < 1.1 * bend);
   CHECK(stage.heap_calls == 0);
-  SECTION("and the preset's gain goes there without a step") {
+  SECTION("and the preset's gain changes without a step") {
     const double loud = stage.peak(2400);
     const double here = stage.largest_bend(2400);
     CHECK(stage.after([&] { folder.write("p.toml", preset("0.1")); }).is_done);
@@ -187,7 +188,7 @@ TEST_CASE("A number in the midst of the model reaches the voice that sounds", "[
   }
 }
 
-TEST_CASE("What a player has turned stays turned", "[reload]") {
+TEST_CASE("A player's changes survive a reload", "[reload]") {
   const Folder folder;
   folder.write("m.mdl", model_text("0.01") + "@Z param 0.00001\n@t damper @s @m Z\n");
   Stage stage(folder.write("p.toml", preset()));
@@ -209,7 +210,7 @@ TEST_CASE("What a player has turned stays turned", "[reload]") {
   CHECK(stage.session.parameter("K") == 0.01);
 }
 
-TEST_CASE("Another structure comes as a load does", "[reload]") {
+TEST_CASE("Another structure is loaded like another scene", "[reload]") {
   const Folder folder;
   folder.write("m.mdl", model_text());
   Stage stage(folder.write("p.toml", preset()));
@@ -227,7 +228,7 @@ TEST_CASE("Another structure comes as a load does", "[reload]") {
   CHECK(stage.peak(2400) > 0.01);
 }
 
-TEST_CASE("An error leaves the sound and is told with its line and a caret", "[reload]") {
+TEST_CASE("An error keeps the sound and is reported with its line and a caret", "[reload]") {
   const Folder folder;
   folder.write("m.mdl", model_text());
   Stage stage(folder.write("p.toml", preset()));
@@ -246,7 +247,7 @@ TEST_CASE("An error leaves the sound and is told with its line and a caret", "[r
   CHECK(has(news.news, folder.file("p.toml") + ":"));
   news = stage.after([&] {
     folder.write("p.toml", preset());
-    folder.write("m.mdl", model_text("40."));  // not stable
+    folder.write("m.mdl", model_text("40."));  // unstable
   });
   for (int i = 0; i < 100 && stage.session.last_reload().is_done; ++i) {
     std::this_thread::sleep_for(20ms);
@@ -256,33 +257,33 @@ TEST_CASE("An error leaves the sound and is told with its line and a caret", "[r
     each->play(4800);
   }
   CHECK(stage.heard == other.heard);
-  // And what is mended is as if nothing had been.
+  // After a correction all is well.
   news = stage.after([&] { folder.write("m.mdl", model_text()); });
   CHECK(news.is_done);
 }
 
-TEST_CASE("A file is followed however it is written", "[reload]") {
+TEST_CASE("A file is watched however it is written", "[reload]") {
   const Folder folder;
   folder.write("m.mdl", model_text());
   Stage stage(folder.write("p.toml", preset()));
   const auto told = [&](const std::function<void()>& change, const std::string& stiffness) {
     CHECK(stage.after(change).news == "p: K = " + stiffness);
   };
-  // As vim and most others do: another file takes its name.
+  // Like vim and most editors: another file takes its name.
   told(
       [&] {
         folder.write("m.mdl.new", model_text("0.011"));
         fs::rename(folder.file("m.mdl.new"), folder.file("m.mdl"));
       },
       "0.011");
-  // Moved away first, and written anew.
+  // Moved away first, then written again.
   told(
       [&] {
         fs::rename(folder.file("m.mdl"), folder.file("m.mdl~"));
         folder.write("m.mdl", model_text("0.012"));
       },
       "0.012");
-  // In two halves: what is not closed yet is not read.
+  // In two parts: the file is not read until it is closed.
   told(
       [&] {
         std::ofstream out(folder.file("m.mdl"));
@@ -292,7 +293,7 @@ TEST_CASE("A file is followed however it is written", "[reload]") {
         out << text.substr(60);
       },
       "0.013");
-  // A link takes its place, and then what it leads to changes.
+  // A link replaces it, and then its target changes.
   folder.write("far.mdl", model_text("0.014"));
   told(
       [&] {
@@ -301,7 +302,7 @@ TEST_CASE("A file is followed however it is written", "[reload]") {
       },
       "0.014");
   told([&] { folder.write("far.mdl", model_text("0.015")); }, "0.015");
-  // Hundreds of others in the same folder are nothing to it.
+  // Hundreds of other files in the same folder do not matter.
   const std::uint64_t count = stage.session.last_reload().count;
   for (int i = 0; i < 300; ++i) {
     folder.write("other" + std::to_string(i), "x");
@@ -310,7 +311,7 @@ TEST_CASE("A file is followed however it is written", "[reload]") {
   CHECK(stage.session.last_reload().count == count);
 }
 
-TEST_CASE("What a preset joins is followed, and what is missing waited for", "[reload]") {
+TEST_CASE("All files of a preset are watched, including missing ones", "[reload]") {
   const Folder folder;
   folder.write("m.mdl", model_text());
   folder.write("with.mdl", "@n mass 1. 0. 0.\n@t springDamper @m @n K 0.\n");
@@ -336,10 +337,10 @@ TEST_CASE("What a preset joins is followed, and what is missing waited for", "[r
   CHECK(stage.session.current()->instrument.masses == 1);
 }
 
-// So many edits of any kind, broken ones too, while a key rings: no crash, nothing that is no
-// number, and no click. What is heard is a x where x swings and a is a gain that moves: its second
-// difference is at most A (w^2 + 2 w a' + a''), with a' and a'' no more than a level's way of 20 ms
-// and a fade's of 50 ms make; a click of -60 dB would be 0.001 A more.
+// Many edits of any kind, including broken ones, while a key rings: no crash, no NaN and no click.
+// The output is a x, where x swings and a is a moving gain: its second difference is at most A (w^2
+// + 2 w a' + a''), with a' and a'' no larger than a level's ramp of 20 ms and a fade of 50 ms
+// allow; a click of -60 dB would add 0.001 A.
 TEST_CASE("Random edits neither crash nor click", "[reload]") {
   const char* const asked = std::getenv("RESSORT_EDITS");
   const int edits = asked != nullptr ? std::atoi(asked) : 20;
@@ -399,14 +400,14 @@ TEST_CASE("Random edits neither crash nor click", "[reload]") {
       folder.write("m.mdl", text);
     });
     for (std::uint64_t count = 0; count != stage.session.last_reload().count;) {
-      count = stage.session.last_reload().count;  // the second of two files may come by itself
+      count = stage.session.last_reload().count;  // the second of two files may come separately
       std::this_thread::sleep_for(60ms);
     }
     stage.play(4800);
     const auto same = stage.session.last_reload();
     broken += same.is_done ? 0 : 1;
     const auto loaded = stage.session.current();
-    // Of a broken text that reads all the same nobody knows the numbers.
+    // A broken text may still be readable, with unknown numbers.
     if (breaks) {
       stage.after([&] {
         now = Numbers{};
@@ -427,7 +428,7 @@ TEST_CASE("Random edits neither crash nor click", "[reload]") {
     CHECK(stage.largest_bend(stage.heard.size()) <
           loudest * (1.02 * w2 + (1.0 + 2.0 * std::sqrt(w2)) * moves + 1e-3));
     REQUIRE(std::isfinite(loudest));
-    CHECK(stage.process.meters().resets == resets);  // what breaks may be a damper below 0
+    CHECK(stage.process.meters().resets == resets);  // a broken text may have a negative damper
   }
   CHECK(broken > 0);
 }

@@ -1,4 +1,4 @@
-// The control side and the audio thread together: loading, swapping, and giving back.
+// The session with an audio thread: loading, swapping and returning engines.
 #include "app/session/session.h"
 
 #include "app/control/registry.h"
@@ -23,7 +23,7 @@ namespace ressort::session_test {
 
 namespace {
 
-// A folder with files of its own that vanish with it.
+// A temporary folder with files.
 struct Folder {
   std::filesystem::path path =
       std::filesystem::temp_directory_path() / ("ressort-session-" + std::to_string(getpid()));
@@ -47,8 +47,8 @@ std::string preset(double stiffness) {
          "\"impulse\"\nrange = [0.02, 0.1]\n";
 }
 
-// What is heard of a process, block by block. A key is struck in one block of every `gap`, anywhere
-// within it, so that a stroke meets the last one's sound in every phase.
+// Listens to a process block by block. A key is struck in one block of every `gap`, at any frame,
+// so that strokes meet in every phase.
 class Ear {
  public:
   Ear(Process& process, std::uint64_t gap) : process_(process), gap_(gap) {}
@@ -86,7 +86,7 @@ class Ear {
 
 constexpr std::uint64_t gap = 40;
 
-// An audio thread that never waits: it plays on until told to stop.
+// An audio thread that plays without waiting until it is stopped.
 class Player {
  public:
   explicit Player(Process& process) : ear_(process, gap), thread_([this] { run(); }) {}
@@ -125,9 +125,9 @@ void wait_for_blocks(const Player& player, std::uint64_t count) {
   }
 }
 
-// What no step between two samples of a linear model exceeds when one key is struck in every `gap`
-// blocks, in whatever phases: the steps of all strokes added, each of them fallen further than the
-// next one. Two strokes are at least gap - 1 blocks apart.
+// A bound on the step between two samples of a linear model with one stroke in every `gap` blocks,
+// in any phase: the sum of the steps of all strokes, each decayed further than the next. Two
+// strokes are at least gap - 1 blocks apart.
 float largest_step_of(const std::string& path) {
   Process process(48000.0);
   Session session(process, at_48k(), {});
@@ -146,7 +146,7 @@ float largest_step_of(const std::string& path) {
 
 }  // namespace
 
-TEST_CASE("Hundreds of swaps while notes sound neither click, leak nor break", "[session]") {
+TEST_CASE("Hundreds of swaps while notes sound cause no clicks, leaks or crashes", "[session]") {
   const Folder folder;
   folder.write("m.mdl", model_text);
   const std::string soft = folder.write("soft.toml", preset(0.05));
@@ -157,17 +157,17 @@ TEST_CASE("Hundreds of swaps while notes sound neither click, leak nor break", "
   REQUIRE(session.load_and_wait(soft));
   const Player player(process);
   wait_for_blocks(player, 200);
-  for (int n = 0; n < 20; ++n) {  // what a first time allocates for good
+  for (int n = 0; n < 20; ++n) {  // one-time allocations
     REQUIRE(session.load_and_wait(n % 2 == 0 ? hard : soft));
   }
   wait_for_blocks(player, 400);
-  std::this_thread::sleep_for(std::chrono::milliseconds(100));  // the worker has timed the last one
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
   const std::size_t before = support::heap_bytes();
   for (int n = 0; n < support::of_all(250, 1000); ++n) {
     REQUIRE(session.load_and_wait(n % 2 == 0 ? hard : soft));
-    wait_for_blocks(player, n % 50);  // some wait for the fade's end, some come in its midst
+    wait_for_blocks(player, n % 50);  // some wait for the end of the fade, some come during it
   }
-  // The last engine to fade has to be collected by the worker before memory is counted.
+  // The worker has to collect the last engine before memory is counted.
   std::size_t after = support::heap_bytes();
   for (int patience = 0; patience < 400 && after > before + 4096; ++patience) {
     wait_for_blocks(player, 50);
@@ -180,11 +180,11 @@ TEST_CASE("Hundreds of swaps while notes sound neither click, leak nor break", "
   const float slope =
       2.0f * player.ear().peak.load() / (48000.0f * static_cast<float>(Process::fade_s));
   CHECK(player.ear().largest_step.load() <= own + slope);
-  CHECK(after <= before + 4096);  // bytes; an engine has more than 20 000
+  CHECK(after <= before + 4096);  // bytes; an engine has more than 20,000
   CHECK(process.meters().swaps > 100);
 }
 
-TEST_CASE("What cannot be loaded is told in full, and what sounds goes on", "[session]") {
+TEST_CASE("A failed load reports all errors, and the sound continues", "[session]") {
   const Folder folder;
   folder.write("m.mdl", model_text);
   const std::string good = folder.write("good.toml", preset(0.1));
@@ -202,9 +202,9 @@ TEST_CASE("What cannot be loaded is told in full, and what sounds goes on", "[se
   CHECK(player.ear().largest_step.load() > 0.001f);
 }
 
-TEST_CASE("A newer load replaces an older one, and the end replaces all", "[session]") {
+TEST_CASE("A newer load replaces an older one, and ending cancels all", "[session]") {
   const Folder folder;
-  // Some seconds of work.
+  // Several seconds of work.
   const std::string large = folder.write(
       "large.mdl",
       "@K param 0.01\n@s mesh 600 600 1. K 0.001 0. 0.\n@out1 posOutput [@s 0.3 0.3]\n");
@@ -219,7 +219,7 @@ TEST_CASE("A newer load replaces an older one, and the end replaces all", "[sess
   {
     Session session(process, at_48k(), {});
     session.load(large, note);
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));  // most often it is at work then
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
     session.load(large, note);
     session.load(large, note);
     const auto loaded = session.load_and_wait(quick);
@@ -242,12 +242,12 @@ TEST_CASE("A newer load replaces an older one, and the end replaces all", "[sess
   CHECK(answers[4] == "the program is ending");
 }
 
-TEST_CASE("What sounds is made anew for another rate, once", "[session]") {
+TEST_CASE("The scene is compiled again for another rate, once", "[session]") {
   const Folder folder;
   const std::string file = folder.write("quick.mdl", model_text);
   Process process(48000.0);
   Session session(process, at_48k(), {});
-  session.set_rate(44100.0);  // before there is anything
+  session.set_rate(44100.0);  // before anything is loaded
   REQUIRE(session.load_and_wait(file));
   const std::uint32_t first = session.current()->serial;
   session.set_rate(96000.0);
@@ -259,8 +259,7 @@ TEST_CASE("What sounds is made anew for another rate, once", "[session]") {
   CHECK(session.status().rate_hz == 96000.0);
 }
 
-TEST_CASE("Parameters are remembered, clamped, and followed when a controller turns them",
-          "[session]") {
+TEST_CASE("Parameters are remembered, clamped, and follow their controllers", "[session]") {
   const Folder folder;
   folder.write("m.mdl", model_text);
   const std::string file = folder.write(
@@ -276,7 +275,7 @@ TEST_CASE("Parameters are remembered, clamped, and followed when a controller tu
   CHECK(session.parameter("K") == 0.1);  // not before it is sent
   const TimedEvent sent{.event = events->front()};
   session.remember({&sent, 1});
-  CHECK(session.parameter("K") == 0.3);  // the range's end
+  CHECK(session.parameter("K") == 0.3);  // end of the range
   std::vector<float> samples(64);
   std::vector<float*> outputs{samples.data()};
   const std::uint8_t turn[] = {0xb0, 74, 127};
@@ -289,7 +288,7 @@ TEST_CASE("Parameters are remembered, clamped, and followed when a controller tu
   CHECK(session.parameter("K") == 0.2);
 }
 
-TEST_CASE("What happens again and again is told once, with how often it was", "[session]") {
+TEST_CASE("Repeated problems are reported once, with their number", "[session]") {
   const Folder folder;
   const std::string file = folder.write("m.mdl", model_text);
   Process process(48000.0);
@@ -302,7 +301,7 @@ TEST_CASE("What happens again and again is told once, with how often it was", "[
   REQUIRE(session.load_and_wait(file));
   Ear ear(process, 1'000'000);
   for (std::uint64_t n = 1; n < 751; ++n) {
-    ear.block(n);  // a second has gone by
+    ear.block(n);  // a second has passed
   }
   const TimedEvent late{
       .event = {.kind = EventKind::bend}, .timing = TimedEvent::When::at_frame, .when = 24000};
@@ -311,7 +310,7 @@ TEST_CASE("What happens again and again is told once, with how often it was", "[
   }
   REQUIRE_FALSE(process.send_ahead(std::vector<TimedEvent>(Process::max_ahead, late)));
   ear.block(751);
-  // How often it was, as it was told; the worker may look while the block is not done.
+  // The reported number of occurrences; the worker may look during the block.
   const auto count = [&](const std::string& news) {
     const std::lock_guard lock(mutex);
     int times = 0;

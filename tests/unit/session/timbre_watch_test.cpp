@@ -1,5 +1,4 @@
-// What is told of the sound while it plays: the same as of its recording, at the console and by
-// OSC.
+// Timbre while the sound plays: the same as from a recording, at the console and by OSC.
 #include "app/session/timbre/timbre_watch.h"
 
 #include <chrono>
@@ -15,7 +14,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Whether it comes true in time; how long that takes is nobody's business.
+// Waits until the condition holds.
 template <class Holds>
 bool comes(Holds&& holds) {
   for (int i = 0; i < 2000; ++i) {
@@ -36,7 +35,7 @@ void same(const std::optional<double>& a, const std::optional<double>& b) {
 
 }  // namespace
 
-TEST_CASE("what is told of a sound as it plays is what its samples say", "[timbre_watch]") {
+TEST_CASE("the timbre reported while a sound plays equals that of its samples", "[timbre_watch]") {
   const Folder folder;
   Harness harness;
   harness.say("load " + write_triangle(folder));
@@ -73,7 +72,7 @@ TEST_CASE("what is told of a sound as it plays is what its samples say", "[timbr
   CHECK(watch.since(count - 1).size() == 1);
 }
 
-TEST_CASE("the console says what a sound is like in words", "[timbre_watch]") {
+TEST_CASE("the console describes a sound in words", "[timbre_watch]") {
   const Folder folder;
   Harness harness;
   CHECK(has(harness.say("timbre"), "no model is loaded"));
@@ -103,7 +102,7 @@ TEST_CASE("the console says what a sound is like in words", "[timbre_watch]") {
   CHECK(has(harness.say("timbre"), "darker: "));
 }
 
-TEST_CASE("OSC sends a frame of timbre every hop, for as long as was asked", "[timbre_watch]") {
+TEST_CASE("OSC sends a timbre frame every hop for the requested time", "[timbre_watch]") {
   const Folder folder;
   Harness harness;
   harness.say("load " + write_triangle(folder));

@@ -26,7 +26,7 @@ std::string error_of(const std::string& name, const SceneOptions& options = {}) 
 
 }  // namespace
 
-TEST_CASE("a preset's scale stands beside it", "[tunings]") {
+TEST_CASE("a preset's scale is beside it", "[tunings]") {
   const Folder folder;
   folder.write("m.mdl", model_text);
   folder.write("two.scl", two_steps);
@@ -40,7 +40,7 @@ TEST_CASE("a preset's scale stands beside it", "[tunings]") {
   CHECK(scene->preset.keys_hz[61] == Approx(300.0 * std::sqrt(2.0)));
   CHECK(scene->preset.a4_hz == 441.0);
   CHECK(load_scene(plain, {})->preset.keys_hz.empty());
-  // What is said goes before it; a map alone is of twelve equal semitones.
+  // Options override it; a keyboard map alone has twelve equal semitones.
   scene = load_scene(tuned, {.keys = {.a4_hz = 415.0, .channels = 4U}});
   CHECK((scene->preset.a4_hz == 415.0 && scene->preset.channels == 4U));
   scene = load_scene(plain, {.keys = {.scale = folder.file("two.scl")}});
@@ -51,7 +51,7 @@ TEST_CASE("a preset's scale stands beside it", "[tunings]") {
   CHECK(scene->preset.keys_hz[62] == Approx(2.0 * c_hz));
 }
 
-TEST_CASE("a tuning that is missing or wrong is told with its file and line", "[tunings]") {
+TEST_CASE("a missing or invalid tuning is reported with its file and line", "[tunings]") {
   const Folder folder;
   folder.write("m.mdl", model_text);
   const std::string bad = folder.write("bad.scl", "bad\n2\n600.0\nx\n");
@@ -66,7 +66,7 @@ TEST_CASE("a tuning that is missing or wrong is told with its file and line", "[
             "'scale' must be the name of a .scl file beside the preset"));
 }
 
-TEST_CASE("the console tunes what sounds", "[tunings]") {
+TEST_CASE("the console tunes the playing scene", "[tunings]") {
   const Folder folder;
   folder.write("m.mdl", model_text);
   const std::string plain = folder.write("plain.toml", preset("a4_hz = 441"));
