@@ -267,10 +267,10 @@ Result<AudioDevice> open_alsa(Process& process, const AudioOptions& options) {
   device.priority = audio_priority;
   device.description = "ALSA '" + options.device + "', " + std::to_string(alsa->out.rate_hz) +
                        " Hz, " + std::to_string(alsa->out.frames) + " frames";
-  device.close = [alsa] {
+  device.running = std::shared_ptr<void>(alsa.get(), [alsa](void*) {
     alsa->stop.raise();
     alsa->thread.join();
-  };
+  });
   device.is_lost = [alsa] { return alsa->lost.is_raised(); };
   device.set_audio_inputs = [alsa](int wanted) { open_capture(*alsa, wanted); };
   device.tick = [] {};

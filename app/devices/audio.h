@@ -3,8 +3,8 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <string>
-#include <utility>
 
 #include "app/devices/wiring.h"
 #include "app/realtime/process.h"
@@ -22,42 +22,20 @@ struct AudioOptions {
   Wiring wiring;                   // connections of the lost device, to be restored
 };
 
-// A running backend. Closing or destroying it ends its audio thread; another backend may then use
-// the process. All functions: [control].
+// A running backend. Its destruction ends its audio thread; another backend may then use the
+// process. All functions: [control].
 struct AudioDevice {
   std::string kind;         // "jack", "alsa" or "dummy"
   std::string description;  // "JACK, 48000 Hz, 256 frames"
   double rate_hz = 48000.0;
-  int priority = 0;  // real-time priority of its audio thread; 0: none
-  std::function<void()> close;
+  int priority = 0;                           // real-time priority of its audio thread; 0: none
   std::function<bool()> is_lost;              // gone or at another rate: close and reopen it
   std::function<void(int)> set_audio_inputs;  // adds inputs until there are this many
   std::function<void()> tick;                 // call it often: connects ports that were plugged in
   std::function<Wiring()> wiring;             // connections to restore on the next device
   bool has_midi = false;                      // delivers MIDI itself, with exact frames
-  std::string note;  // backends that were tried before it, and their errors
-
-  AudioDevice() = default;
-  AudioDevice(AudioDevice&& other) noexcept { *this = std::move(other); }
-  AudioDevice& operator=(AudioDevice&& other) noexcept {
-    std::swap(kind, other.kind);
-    std::swap(description, other.description);
-    std::swap(rate_hz, other.rate_hz);
-    std::swap(priority, other.priority);
-    std::swap(close, other.close);
-    std::swap(is_lost, other.is_lost);
-    std::swap(set_audio_inputs, other.set_audio_inputs);
-    std::swap(tick, other.tick);
-    std::swap(wiring, other.wiring);
-    std::swap(has_midi, other.has_midi);
-    std::swap(note, other.note);
-    return *this;
-  }
-  ~AudioDevice() {
-    if (close) {
-      close();
-    }
-  }
+  std::string note;               // backends that were tried before it, and their errors
+  std::shared_ptr<void> running;  // ends the audio thread when it is reset
 };
 
 // Each opens a backend. Errors say what is missing and what to do.

@@ -54,10 +54,10 @@ Result<AudioDevice> open_dummy(Process& process, const AudioOptions& options) {
   device.priority = audio_priority;
   device.description = "dummy (silent), " + std::to_string(static_cast<int>(options.rate_hz)) +
                        " Hz, " + std::to_string(options.period_frames) + " frames";
-  device.close = [dummy] {
+  device.running = std::shared_ptr<void>(dummy.get(), [dummy](void*) {
     dummy->stop.raise();
     dummy->thread.join();
-  };
+  });
   device.is_lost = [] { return false; };
   device.set_audio_inputs = [](int) {};
   device.tick = [] {};

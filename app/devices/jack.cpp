@@ -337,7 +337,7 @@ Result<AudioDevice> open_jack(Process& process, const AudioOptions& options) {
                  "; start one (qjackctl, or jackd -d alsa), or choose another output: -a alsa, "
                  "-a dummy"};
   }
-  const auto close = [jack] { jack_client_close(jack->client); };
+  std::shared_ptr<void> running(jack.get(), [jack](void*) { jack_client_close(jack->client); });
   jack->rate_hz = static_cast<double>(jack_get_sample_rate(jack->client));
   jack->clock_offset_ns = monotonic_ns() - static_cast<std::int64_t>(jack_get_time()) * 1000;
   process.set_rate(jack->rate_hz);
@@ -351,7 +351,6 @@ Result<AudioDevice> open_jack(Process& process, const AudioOptions& options) {
   process.has_time.lower();
   jack_on_info_shutdown(jack->client, on_shutdown, jack.get());
   if (!register_ports(*jack) || jack_activate(jack->client) != 0) {
-    close();
     return Error{"the JACK server registered no ports; there may be too many clients"};
   }
   describe_ports(*jack);
@@ -367,7 +366,7 @@ Result<AudioDevice> open_jack(Process& process, const AudioOptions& options) {
                        std::to_string(jack_get_buffer_size(jack->client)) + " frames";
   device.priority = jack_client_real_time_priority(jack->client);
   device.has_midi = true;
-  device.close = close;
+  device.running = std::move(running);
   device.is_lost = [jack] { return jack->lost.is_raised(); };
   device.set_audio_inputs = [jack](int wanted) {
     if (!jack->lost.is_raised()) {

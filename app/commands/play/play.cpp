@@ -158,7 +158,7 @@ class Player {
     osc_.reset();
     player_.reset();
     midi_.reset();
-    if (device_.close) {
+    if (device_.running) {
       fade_out();
     }
     // The session's worker may still call the device, but the device never calls the session.

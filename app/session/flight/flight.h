@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
@@ -72,33 +71,5 @@ Result<std::unique_ptr<Engine>> make_flight_engine(const Flight& flight,
 
 // Replaces parameter values in a scene. Returns the values that the texts have.
 std::vector<Setting> keep_values(Scene& scene, std::span<const Setting> kept);
-
-// Collects a flight while it is played. [one thread]
-class FlightLog {
- public:
-  // Limits. Beyond them, the beginning of the flight is lost.
-  static constexpr std::size_t most_records = std::size_t{1} << 19;
-  static constexpr std::size_t most_engines = 10'000;
-  static constexpr std::size_t most_text_bytes = std::size_t{64} << 20;
-
-  explicit FlightLog(FlightSetup setup) { flight_.setup = std::move(setup); }
-
-  void add(FlightEngine engine, bool has_audio_inputs);
-  // Reads all records so far.
-  void drain(Process& process);
-  // Returns true once an engine has played.
-  bool has_begun() const;
-  // Returns the flight so far, or an error before the first engine and beyond the limits.
-  Result<Flight> flight() const;
-
- private:
-  void forget();
-
-  Flight flight_;
-  std::deque<FlightRecord> records_;  // a deque, which grows without moving
-  std::vector<std::shared_ptr<const std::vector<SceneFile>>> texts_;  // without duplicates
-  std::size_t text_bytes_ = 0;
-  std::string lost_;  // reason why the beginning is lost; empty: it is complete
-};
 
 }  // namespace ressort::session
