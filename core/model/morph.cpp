@@ -391,7 +391,7 @@ class Morphing {
 
   std::span<const MorphStop> stops_;
   Network out_;
-  std::vector<double> values_;  // of its parameters, as the model has them
+  std::vector<double> values_;  // [parameter] initial value
   std::optional<Error> error_;
 };
 

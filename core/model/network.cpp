@@ -13,7 +13,7 @@ void append(std::string& key, std::uint64_t bits) {
   key.append(reinterpret_cast<const char*>(&bits), sizeof bits);
 }
 
-// Two formulas with one key are the same, -0 and 0 being two numbers.
+// Returns a key that is equal for equal formulas. It distinguishes -0 from 0.
 std::string key_of(const Formula& formula) {
   std::string key;
   for (const Step& step : formula) {
@@ -29,7 +29,7 @@ std::size_t hash_of(const Drawing& drawing) {
          std::hash<std::string_view>()(drawing.group);
 }
 
-// Builds the canonical network element by element, taking what each one needs from the old.
+// Builds the canonical network element by element, and moves the parts in use from the old one.
 class Renumbering {
  public:
   explicit Renumbering(Network network)
