@@ -8,9 +8,9 @@
 #include <nlohmann/json.hpp>
 
 #include "app/exit_code.h"
-#include "app/session/admit.h"
+#include "app/session/compile_scene.h"
 #include "app/session/files.h"
-#include "app/session/load_news.h"
+#include "app/session/load_progress.h"
 #include "app/session/loader.h"
 #include "app/session/memory.h"
 #include "app/session/timing.h"

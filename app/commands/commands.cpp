@@ -11,7 +11,7 @@
 #include "app/commands/flight/flight_sound.h"
 #include "app/commands/progress_bar.h"
 #include "app/say.h"
-#include "app/session/load_news.h"
+#include "app/session/load_progress.h"
 
 namespace ressort::commands {
 namespace {
@@ -58,7 +58,7 @@ std::vector<int> ending_signals() {
 int render_command(const RenderOptions& options, bool is_quiet) {
   std::optional<ProgressBar> bar(!is_quiet);
   RenderOptions watched = options;
-  LoadProgress news(options.name, is_quiet ? LoadProgress::Tell() : complain);
+  LoadProgress news(options.name, is_quiet ? MessageHandler() : complain);
   watched.loading = Progress([&](std::string_view stage) {
     news.at(stage);
     return true;  // a signal ends the process

@@ -4,7 +4,7 @@
 
 #include "app/exit_code.h"
 #include "app/session/files.h"
-#include "app/session/load_news.h"
+#include "app/session/load_progress.h"
 #include "app/session/loader.h"
 #include "core/compile/compile.h"
 #include "core/model/faust/faust.h"

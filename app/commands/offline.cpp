@@ -10,7 +10,7 @@
 #include "app/control/registry.h"
 #include "app/realtime/process.h"
 #include "app/realtime/thread_pool.h"
-#include "app/session/admit.h"
+#include "app/session/compile_scene.h"
 #include "app/session/files.h"
 #include "app/session/memory.h"
 #include "app/text.h"
@@ -291,22 +291,22 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
                               ", the number of cores of this machine");
   }
   ThreadPool pool(threads > 0 ? std::min(threads, core_count()) : core_count());
-  auto compiled = admit(*scene,
-                        {.rate_hz = options.rate_hz,
-                         .rescale = options.rescale,
-                         .bare = is_bare,
-                         .voices = options.voices,
-                         .precision = options.precision,
-                         .method = options.method,
-                         .budget = options.budget,
-                         .executor = &pool,
-                         .find_gain = !scene->has_preset && !is_bare,
-                         .force = options.force,
-                         .settings = options.parameters,
-                         .reach = reach_of(*lines, scene->network),
-                         .progress = options.loading,
-                         .most_bytes = free_memory_bytes()},
-                        scene->warnings, options.is_strict);
+  auto compiled = compile_scene(*scene,
+                                {.rate_hz = options.rate_hz,
+                                 .rescale = options.rescale,
+                                 .bare = is_bare,
+                                 .voices = options.voices,
+                                 .precision = options.precision,
+                                 .method = options.method,
+                                 .budget = options.budget,
+                                 .executor = &pool,
+                                 .find_gain = !scene->has_preset && !is_bare,
+                                 .force = options.force,
+                                 .settings = options.parameters,
+                                 .reach = reach_of(*lines, scene->network),
+                                 .progress = options.loading,
+                                 .most_bytes = free_memory_bytes()},
+                                scene->warnings, options.is_strict);
   if (!compiled) {
     return compiled.error();
   }

@@ -36,10 +36,10 @@ void ProblemReports::add_lost_events(const Meters& now) {
   }
 }
 
-void ProblemReports::report(const std::function<void(const std::string&)>& tell) {
+void ProblemReports::report(const MessageHandler& on_message) {
   for (RateLimit* const limit : {&resets_, &overloads_, &late_, &dropped_}) {
     if (const auto message = limit->take()) {
-      tell(*message);
+      on_message(*message);
     }
   }
 }

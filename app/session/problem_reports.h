@@ -2,11 +2,11 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <string>
 
 #include "app/realtime/process.h"
 #include "app/realtime/rate_limit.h"
+#include "app/session/load_progress.h"
 #include "core/compile/compile.h"
 
 namespace ressort::session {
@@ -23,7 +23,7 @@ class ProblemReports {
   // Adds late and dropped events since the last call.
   void add_lost_events(const Meters& now);
   // Reports what is due.
-  void report(const std::function<void(const std::string&)>& tell);
+  void report(const MessageHandler& on_message);
 
  private:
   Precision precision_;

@@ -19,10 +19,10 @@ constexpr double unknown_rate_hz = 44100.0;         // replaced at the first blo
 }  // namespace
 
 struct Recorder::Work {
-  Work(Process& of, Tell teller) : process(of), tell(std::move(teller)) {}
+  Work(Process& of, MessageHandler handler) : process(of), on_message(std::move(handler)) {}
 
   Process& process;
-  Tell tell;
+  MessageHandler on_message;
   std::string path;
   Existing existing = Existing::refuse;
   std::optional<SoundWriter> file;
@@ -112,8 +112,8 @@ struct Recorder::Work {
       if (failure) {
         process.is_recording.lower();
         end();
-        has_failed.raise();  // first, because `tell` may ask
-        tell(failure->message);
+        has_failed.raise();  // first, because `on_message` may ask
+        on_message(failure->message);
         return;
       }
       lock.lock();
@@ -121,8 +121,8 @@ struct Recorder::Work {
   }
 };
 
-Recorder::Recorder(Process& process, Tell tell)
-    : work_(std::make_unique<Work>(process, std::move(tell))) {}
+Recorder::Recorder(Process& process, MessageHandler on_message)
+    : work_(std::make_unique<Work>(process, std::move(on_message))) {}
 
 Recorder::~Recorder() {
   static_cast<void>(stop());

@@ -1,11 +1,11 @@
 // app/session: records the output to a sound file, on a thread of its own.
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <string>
 
 #include "app/realtime/process.h"
+#include "app/session/load_progress.h"
 #include "app/session/new_file.h"
 #include "core/result.h"
 
@@ -13,10 +13,8 @@ namespace ressort::session {
 
 class Recorder {
  public:
-  using Tell = std::function<void(const std::string&)>;
-
-  // `tell` receives the error if a recording ends by itself; on the recorder's thread.
-  Recorder(Process& process, Tell tell);
+  // `on_message` receives the error if a recording ends by itself; on the recorder's thread.
+  Recorder(Process& process, MessageHandler on_message);
   ~Recorder();
 
   // Starts a 24-bit recording of the output. If the program is killed, the file is readable up to

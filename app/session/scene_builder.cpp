@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "app/session/admit.h"
-#include "app/session/load_news.h"
+#include "app/session/compile_scene.h"
+#include "app/session/load_progress.h"
 #include "app/session/memory.h"
 #include "app/session/timing.h"
 
@@ -32,17 +32,18 @@ struct SceneBuilder::Prepared {
   FlightEngine made_of;
 };
 
-SceneBuilder::SceneBuilder(const SessionOptions& options, Tell tell, WorkQueue& queue,
-                           CurrentScene& current, EngineSupply& engines, SceneWatch& watch)
+SceneBuilder::SceneBuilder(const SessionOptions& options, MessageHandler on_message,
+                           WorkQueue& queue, CurrentScene& current, EngineSupply& engines,
+                           SceneWatch& watch)
     : options_(options),
-      tell_(std::move(tell)),
+      on_message_(std::move(on_message)),
       queue_(queue),
       current_(current),
       engines_(engines),
       watch_(watch) {}
 
 Result<std::shared_ptr<const Loaded>> SceneBuilder::load(const LoadRequest& request) {
-  LoadProgress news(request.name, tell_);
+  LoadProgress news(request.name, on_message_);
   bool was_stopped = false;
   const Progress progress([&](std::string_view stage) {
     news.at(stage);
@@ -114,7 +115,7 @@ Result<std::shared_ptr<const Loaded>> SceneBuilder::play(const LoadRequest& requ
   const Scene& scene = prepared.scene;
   CompileOptions& options = prepared.options;
   std::vector<std::string> warnings = scene.warnings;
-  auto compiled = admit(scene, options, warnings);
+  auto compiled = compile_scene(scene, options, warnings);
   if (!compiled) {
     return compiled.error();
   }
@@ -199,10 +200,10 @@ void SceneBuilder::improve() {
   engines_.offer(std::move(compiled->engine), source.network, std::move(made_of),
                  current_.loaded()->instrument.audio_inputs > 0);
   if (!overload.empty()) {
-    tell_(overload);
+    on_message_(overload);
   }
   if (broken) {
-    tell_(*broken);
+    on_message_(*broken);
   }
   measure_parts();
 }

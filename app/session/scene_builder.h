@@ -2,7 +2,6 @@
 #pragma once
 
 #include <chrono>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -10,13 +9,12 @@
 
 #include "app/session/current_scene.h"
 #include "app/session/engine_supply.h"
+#include "app/session/load_progress.h"
 #include "app/session/watch/scene_watch.h"
 #include "app/session/work_queue.h"
 #include "core/compile/compile.h"
 
 namespace ressort::session {
-
-using Tell = std::function<void(const std::string&)>;
 
 struct SessionOptions {
   CompileOptions compile;              // its rate is the backend's
@@ -39,8 +37,8 @@ struct Draft {
 // All functions: [worker].
 class SceneBuilder {
  public:
-  SceneBuilder(const SessionOptions& options, Tell tell, WorkQueue& queue, CurrentScene& current,
-               EngineSupply& engines, SceneWatch& watch);
+  SceneBuilder(const SessionOptions& options, MessageHandler on_message, WorkQueue& queue,
+               CurrentScene& current, EngineSupply& engines, SceneWatch& watch);
 
   // Reads, compiles and plays a scene. On an error the playing scene continues.
   Result<std::shared_ptr<const Loaded>> load(const LoadRequest& request);
@@ -71,7 +69,7 @@ class SceneBuilder {
   Prepared prepare(const LoadRequest& request, Draft draft, const Progress& progress) const;
 
   const SessionOptions& options_;
-  Tell tell_;
+  MessageHandler on_message_;
   WorkQueue& queue_;
   CurrentScene& current_;
   EngineSupply& engines_;

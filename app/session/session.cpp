@@ -36,7 +36,7 @@ Result<T> explained(Result<T> result) {
 
 }  // namespace
 
-Session::Session(Process& process, const SessionOptions& options, Tell tell)
+Session::Session(Process& process, const SessionOptions& options, MessageHandler on_message)
     : process_(process),
       options_(options),
       queue_(options.compile.rate_hz),
@@ -46,8 +46,8 @@ Session::Session(Process& process, const SessionOptions& options, Tell tell)
       watch_(options.watch),
       timbre_(process),
       worker_(
-          process, options_, tell ? std::move(tell) : [](const std::string&) {}, queue_, current_,
-          flights_, engines_, watch_) {}
+          process, options_, on_message ? std::move(on_message) : [](const std::string&) {}, queue_,
+          current_, flights_, engines_, watch_) {}
 
 Session::~Session() {
   end();

@@ -43,9 +43,9 @@ class Session {
   using Present = CurrentScene::Present;
   using PictureOf = EngineSupply::PictureOf;
 
-  // `tell` receives messages about events that nobody asked for, such as an unstable voice, on the
-  // worker's thread. The process must outlive the session.
-  Session(Process& process, const SessionOptions& options, Tell tell);
+  // `on_message` receives messages about events that nobody asked for, such as an unstable voice,
+  // on the worker's thread. The process must outlive the session.
+  Session(Process& process, const SessionOptions& options, MessageHandler on_message);
   ~Session();
 
   // Loads a scene in the worker and calls `answer` there, with the loaded scene or with the whole
@@ -94,7 +94,7 @@ class Session {
 
   // MIDI learn: the next knob that moves controls this parameter, or the control with this OSC
   // name, instead of its function in the preset. Pedals, bank select and the like do not count. The
-  // pair is reported to `tell`, and lasts until another scene is loaded.
+  // pair is reported to `on_message`, and lasts until another scene is loaded.
   Result<Done> learn(const std::string& target) { return current_.learn(target); }
   // Forgets the controllers of this target, or all if it is empty. Returns how many.
   std::size_t unlearn(const std::string& target) { return current_.unlearn(target); }

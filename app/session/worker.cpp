@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "app/session/files.h"
-#include "app/session/load_news.h"
+#include "app/session/load_progress.h"
 #include "app/session/modes/tuned_files.h"
 #include "app/text.h"
 #include "core/model/language/expression.h"
@@ -30,18 +30,18 @@ std::string to_text(const std::vector<Setting>& settings) {
 
 }  // namespace
 
-Worker::Worker(Process& process, const SessionOptions& options, Tell tell, WorkQueue& queue,
-               CurrentScene& current, FlightRecorder& flights, EngineSupply& engines,
-               SceneWatch& watch)
+Worker::Worker(Process& process, const SessionOptions& options, MessageHandler on_message,
+               WorkQueue& queue, CurrentScene& current, FlightRecorder& flights,
+               EngineSupply& engines, SceneWatch& watch)
     : process_(process),
       options_(options),
-      tell_(std::move(tell)),
+      on_message_(std::move(on_message)),
       queue_(queue),
       current_(current),
       flights_(flights),
       engines_(engines),
       watch_(watch),
-      builder_(options, tell_, queue, current, engines, watch),
+      builder_(options, on_message_, queue, current, engines, watch),
       problems_(options.compile.precision),
       thread_([this] { run(); }) {}
 
@@ -70,7 +70,7 @@ void Worker::run() {
       }
     } catch (const std::exception& error) {
       // The playing scene continues.
-      tell_("error in the background: " + describe(error));
+      on_message_("error in the background: " + describe(error));
     }
   }
 }
@@ -97,7 +97,7 @@ void Worker::load(const LoadJob& job) {
   if (job.answer) {
     job.answer(result);
   } else if (!result) {
-    tell_(result.error().message);
+    on_message_(result.error().message);
   }
   if (result) {
     builder_.measure_parts();
@@ -114,7 +114,7 @@ void Worker::rebuild_at_new_rate() {
   if (result) {
     builder_.measure_parts();
   } else if (!queue_.has_newer_load()) {
-    tell_(result.error().message);
+    on_message_(result.error().message);
     queue_.set_built_rate(rate_hz);  // it is not tried again and again
   }
 }
@@ -127,16 +127,16 @@ void Worker::change_program(int number) {
   if (index < presets.size()) {
     const auto answer = [this, name = presets[index], program](const auto& result) {
       if (result) {
-        tell_(program + ": " + name);
+        on_message_(program + ": " + name);
       } else if (result.error().message != replaced && result.error().message != ending) {
-        tell_(result.error().message);
+        on_message_(result.error().message);
       }
     };
     queue_.add(
         LoadJob{{.name = presets[index], .reach = Reach::own_folders, .lets_ring = true}, answer});
   } else if (unknown_programs_.insert(number).second) {
-    tell_("there is no " + program + " in bank " + std::to_string(number / 128) + "; there are " +
-          counted(presets.size(), "preset", "presets"));
+    on_message_("there is no " + program + " in bank " + std::to_string(number / 128) +
+                "; there are " + counted(presets.size(), "preset", "presets"));
   }
 }
 
@@ -163,14 +163,14 @@ void Worker::read_reports() {
   }
   const Meters now = process_.meters();
   if (const auto row = current_.assign_moved_controller(now)) {
-    tell_("controller " + std::to_string(row->controller) + " now controls " + row->target +
-          "; 'unlearn " + row->target + "' ends that, 'save NAME' keeps it");
+    on_message_("controller " + std::to_string(row->controller) + " now controls " + row->target +
+                "; 'unlearn " + row->target + "' ends that, 'save NAME' keeps it");
   }
   if (const auto news = flights_.collect(now)) {
-    tell_(*news);
+    on_message_(*news);
   }
   problems_.add_lost_events(now);
-  problems_.report(tell_);
+  problems_.report(on_message_);
 }
 
 // --- reloads ------------------------------------------------------------------------------------
@@ -208,7 +208,7 @@ void Worker::reload() {
     news.news += "\nthe scene that was loaded before keeps playing";
   }
   watch_.publish(news);
-  tell_(news.news);
+  on_message_(news.news);
 }
 
 // Applies an edited scene with as little change of the sound as possible: changed start values are
@@ -259,7 +259,7 @@ Result<std::string> Worker::apply_edit(Draft draft) {
                             before->third == draft.scene.third &&
                             before->has_preset == draft.scene.has_preset;
   }
-  LoadProgress news(name, tell_);
+  LoadProgress news(name, on_message_);
   const Progress progress([&](std::string_view stage) {
     news.at(stage);
     return !queue_.has_newer_load();

@@ -22,8 +22,9 @@ namespace ressort::session {
 class Worker {
  public:
   // Starts the thread. It ends after queue.end(), and the destructor waits for it.
-  Worker(Process& process, const SessionOptions& options, Tell tell, WorkQueue& queue,
-         CurrentScene& current, FlightRecorder& flights, EngineSupply& engines, SceneWatch& watch);
+  Worker(Process& process, const SessionOptions& options, MessageHandler on_message,
+         WorkQueue& queue, CurrentScene& current, FlightRecorder& flights, EngineSupply& engines,
+         SceneWatch& watch);
   ~Worker();
 
   // Answers to inquiries. See Session. [worker]
@@ -55,7 +56,7 @@ class Worker {
 
   Process& process_;
   const SessionOptions& options_;
-  Tell tell_;
+  MessageHandler on_message_;
   WorkQueue& queue_;
   CurrentScene& current_;
   FlightRecorder& flights_;

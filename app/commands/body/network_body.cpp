@@ -5,7 +5,7 @@
 #include "app/commands/body/body.h"
 #include "app/exit_code.h"
 #include "app/session/files.h"
-#include "app/session/load_news.h"
+#include "app/session/load_progress.h"
 #include "app/session/loader.h"
 #include "app/session/modes/known_modes.h"
 #include "app/text.h"

@@ -10,7 +10,7 @@
 #include "app/commands/put_figure.h"
 #include "app/exit_code.h"
 #include "app/session/files.h"
-#include "app/session/load_news.h"
+#include "app/session/load_progress.h"
 #include "app/session/sound_file.h"
 #include "app/text.h"
 #include "core/identification/identify.h"
@@ -85,7 +85,7 @@ int recording_body(const BodyOptions& options) {
     return complain_of(options.picture + ": " + found.error().message);
   }
   LoadProgress news(options.input,
-                [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
+                    [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
   const Progress progress([&](std::string_view stage) {
     news.at(stage);
     return true;  // Ctrl-C ends the process

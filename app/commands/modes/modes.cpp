@@ -5,9 +5,9 @@
 #include "app/commands/modes/shapes_figure.h"
 #include "app/commands/put_figure.h"
 #include "app/exit_code.h"
-#include "app/session/admit.h"
+#include "app/session/compile_scene.h"
 #include "app/session/files.h"
-#include "app/session/load_news.h"
+#include "app/session/load_progress.h"
 #include "app/session/loader.h"
 #include "app/session/modes/known_modes.h"
 #include "app/text.h"
@@ -81,7 +81,7 @@ int modes_command(const ModesOptions& options) {
     return refuse(options.output + ": " + found.error().message);
   }
   LoadProgress news(options.name,
-                [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
+                    [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
   const Progress progress([&](std::string_view stage) {
     news.at(stage);
     return true;  // Ctrl-C ends the process

@@ -22,7 +22,7 @@
 #include "app/devices/midi_input.h"
 #include "app/realtime/thread_pool.h"
 #include "app/say.h"
-#include "app/session/load_news.h"
+#include "app/session/load_progress.h"
 #include "app/text.h"
 
 namespace ressort::commands {

@@ -13,9 +13,9 @@
 #include "app/commands/timbre/describe_text.h"
 #include "app/commands/timbre/sweep.h"
 #include "app/exit_code.h"
-#include "app/session/admit.h"
+#include "app/session/compile_scene.h"
 #include "app/session/files.h"
-#include "app/session/load_news.h"
+#include "app/session/load_progress.h"
 #include "app/session/loader.h"
 #include "app/session/modes/known_modes.h"
 #include "app/session/sound_file.h"
@@ -138,7 +138,7 @@ Result<Description> describe_note(const DescribeOptions& options, const Progress
 Result<Description> describe_model(const DescribeOptions& options,
                                    const DescriptionProgress& progress, const Warn& warn) {
   LoadProgress news(options.name,
-                [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
+                    [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
   const Progress loading([&](std::string_view stage) {
     news.at(stage);
     return progress(0.0);

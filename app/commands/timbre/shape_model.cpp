@@ -9,10 +9,10 @@
 #include "app/commands/progress_bar.h"
 #include "app/commands/timbre/description.h"
 #include "app/exit_code.h"
-#include "app/session/admit.h"
+#include "app/session/compile_scene.h"
 #include "app/session/current_scene.h"
 #include "app/session/files.h"
-#include "app/session/load_news.h"
+#include "app/session/load_progress.h"
 #include "app/session/loader.h"
 #include "app/session/memory.h"
 #include "app/session/modes/known_modes.h"
@@ -190,12 +190,12 @@ int shape_model(const ShapeOptions& options, const std::function<bool()>& goes_o
     rate_hz = options.rate_hz.value_or(like.rate_hz);
   }
   std::vector<std::string> warnings = scene->warnings;
-  const auto compiled = admit(*scene,
-                              {.rate_hz = rate_hz,
-                               .find_gain = !scene->has_preset,
-                               .progress = progress,
-                               .most_bytes = free_memory_bytes()},
-                              warnings);
+  const auto compiled = compile_scene(*scene,
+                                      {.rate_hz = rate_hz,
+                                       .find_gain = !scene->has_preset,
+                                       .progress = progress,
+                                       .most_bytes = free_memory_bytes()},
+                                      warnings);
   if (!compiled) {
     return refuse(compiled.error().message);
   }

@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "app/realtime/denormals.h"
-#include "app/session/admit.h"
+#include "app/session/compile_scene.h"
 
 namespace ressort::voicing {
 namespace {
@@ -23,7 +23,7 @@ Scene scene_of(const std::string& name) {
 
 Compiled compiled_of(const Scene& scene, double rate_hz) {
   std::vector<std::string> warnings;
-  auto compiled = admit(scene, {.rate_hz = rate_hz}, warnings);
+  auto compiled = compile_scene(scene, {.rate_hz = rate_hz}, warnings);
   if (!compiled) {
     throw std::runtime_error(compiled.error().message);
   }

@@ -1,7 +1,7 @@
 // Measures the pitch of shipped presets as `play` plays them, from the sound only, and verifies
 // that the measurement detects a deviation of one cent.
 #include "app/realtime/denormals.h"
-#include "app/session/admit.h"
+#include "app/session/compile_scene.h"
 #include "app/session/loader.h"
 #include "tests/support/pitch.h"
 #include "tests/support/player.h"
@@ -19,7 +19,7 @@ double heard_cents(const std::string& name, double rate_hz, int key, double bent
   const auto scene = load_scene(name, {});
   REQUIRE(scene);
   std::vector<std::string> warnings;
-  auto made = admit(*scene, {.rate_hz = rate_hz}, warnings);
+  auto made = compile_scene(*scene, {.rate_hz = rate_hz}, warnings);
   REQUIRE(made);
   const int transpose = made->instrument.transpose;
   const double wanted_hz = 440.0 * std::exp2((key + transpose - 69) / 12.0);

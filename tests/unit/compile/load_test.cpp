@@ -6,7 +6,7 @@
 #include <new>
 #include <string>
 
-#include "app/session/load_news.h"
+#include "app/session/load_progress.h"
 #include "core/analysis/linear.h"
 #include "core/analysis/stability.h"
 #include "core/compile/make_engine.h"

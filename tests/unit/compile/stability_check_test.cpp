@@ -2,7 +2,7 @@
 // leaves these ranges.
 #include "core/compile/stability_check.h"
 
-#include "app/session/admit.h"
+#include "app/session/compile_scene.h"
 #include "core/model/topology.h"
 #include "tests/support/player.h"
 #include "tests/support/poles.h"
@@ -34,7 +34,7 @@ Scene scene_of(const std::string& text, const Preset& preset = {}) {
 // Returns the error or the warning for a model without a preset; empty if it is admitted.
 std::string said_to(const std::string& text, const CompileOptions& options = {}) {
   std::vector<std::string> warnings;
-  const auto admitted = admit(scene_of(text), options, warnings);
+  const auto admitted = compile_scene(scene_of(text), options, warnings);
   REQUIRE(warnings.size() <= 1);
   return !admitted ? admitted.error().message : warnings.empty() ? "" : warnings[0];
 }
@@ -257,7 +257,7 @@ TEST_CASE("A bow that is too strong for its time steps is reported at its line, 
   CHECK(said_to(bowed + "100" + heard).find("; lower Z, or use a rate of 735000 Hz") !=
         std::string::npos);
   std::vector<std::string> warnings;
-  const auto strict = admit(scene_of(bowed + "20" + heard), {}, warnings, true);
+  const auto strict = compile_scene(scene_of(bowed + "20" + heard), {}, warnings, true);
   REQUIRE(!strict);
   CHECK(strict.error().message.find("there.mdl:3:1: error: the bow 'b'") == 0);
   // Published bows have no such limit. A place halfway between two masses has twice their mass.
@@ -286,7 +286,8 @@ TEST_CASE("A bow that is too strong for its time steps is reported at its line, 
 
 TEST_CASE("A range that is too wide is narrowed and reported at its line", "[stability_check]") {
   std::vector<std::string> warnings;
-  const auto low = admit(scene_of(oscillator, with_range("K", 0.5, 0.1, 5.0)), {}, warnings);
+  const auto low =
+      compile_scene(scene_of(oscillator, with_range("K", 0.5, 0.1, 5.0)), {}, warnings);
   REQUIRE(low);
   CHECK(warnings == std::vector<std::string>{"here.toml:7:3: warning: 'K' is kept below 3.99999; "
                                              "above it the model is not stable"});
@@ -299,13 +300,14 @@ TEST_CASE("A range that is too wide is narrowed and reported at its line", "[sta
   CHECK(info.safe.highest == Approx(4.0).epsilon(1e-12));
   warnings.clear();
   const std::string heavy = "@M param 1\n@o osc M 0.1 0.001 0. 0.\n" + scenes::output(1, "o");
-  CHECK(admit(scene_of(heavy, {.parameters = {{"M", 1.0, 0.02, 1.0, {4, 1}}}}), {}, warnings));
+  CHECK(compile_scene(scene_of(heavy, {.parameters = {{"M", 1.0, 0.02, 1.0, {4, 1}}}}), {},
+                      warnings));
   CHECK(warnings == std::vector<std::string>{"here.toml:4:1: warning: 'M' is kept above 0.0255001; "
                                              "below it the model is not stable"});
   // With `force` the range stays as requested.
   warnings.clear();
-  const auto forced =
-      admit(scene_of(oscillator, with_range("K", 0.5, 0.1, 5.0)), {.force = true}, warnings);
+  const auto forced = compile_scene(scene_of(oscillator, with_range("K", 0.5, 0.1, 5.0)),
+                                    {.force = true}, warnings);
   REQUIRE(forced);
   CHECK(warnings.empty());
   CHECK(forced->instrument.parameters[0].maximum == 5.0);

@@ -11,18 +11,20 @@
 
 namespace ressort::session {
 
+// Receives messages for a person.
+using MessageHandler = std::function<void(const std::string&)>;
+
 // Reports the stage of a load after one second and then every two seconds. [one thread]
 class LoadProgress {
  public:
-  using Tell = std::function<void(const std::string&)>;
-  LoadProgress(std::string name, Tell tell);
+  LoadProgress(std::string name, MessageHandler on_message);
 
   void at(std::string_view stage);
 
  private:
   using Clock = std::chrono::steady_clock;
   std::string name_;
-  Tell tell_;
+  MessageHandler on_message_;
   Clock::time_point start_ = Clock::now();
   Clock::time_point next_ = start_ + std::chrono::seconds(1);
 };

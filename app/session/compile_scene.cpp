@@ -1,4 +1,4 @@
-#include "app/session/admit.h"
+#include "app/session/compile_scene.h"
 
 #include <algorithm>
 
@@ -68,8 +68,8 @@ CompiledScene compile_to_play(const Scene& scene, const CompileOptions& options,
   return admission;
 }
 
-Result<Compiled> admit(const Scene& scene, const CompileOptions& options,
-                       std::vector<std::string>& warnings, bool is_strict) {
+Result<Compiled> compile_scene(const Scene& scene, const CompileOptions& options,
+                               std::vector<std::string>& warnings, bool is_strict) {
   CompiledScene admission = compile_to_play(scene, options, is_strict);
   std::string errors;
   for (const Finding& finding : admission.findings) {

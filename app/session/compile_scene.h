@@ -27,8 +27,8 @@ CompiledScene compile_to_play(const Scene& scene, const CompileOptions& options,
 
 // The same, for callers that only need the compiled scene. Appends warnings to `warnings`; the
 // error's message has all errors, one a line.
-Result<Compiled> admit(const Scene& scene, const CompileOptions& options,
-                       std::vector<std::string>& warnings, bool is_strict = false);
+Result<Compiled> compile_scene(const Scene& scene, const CompileOptions& options,
+                               std::vector<std::string>& warnings, bool is_strict = false);
 
 // Returns a warning if the scene is unstable at these parameters, for callers that do not play it.
 // [any thread but audio]
