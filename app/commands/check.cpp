@@ -1,4 +1,5 @@
 #include "app/commands/check.h"
+#include "app/commands/output.h"
 
 #include <unistd.h>
 
@@ -10,7 +11,6 @@
 #include "app/exit_code.h"
 #include "app/session/compile_scene.h"
 #include "app/session/files.h"
-#include "app/session/load_progress.h"
 #include "app/session/loader.h"
 #include "app/session/memory.h"
 #include "app/session/timing.h"
@@ -276,12 +276,7 @@ void print_report(const Scene& scene, const Compiled& compiled, const Proved& pr
 }  // namespace
 
 int check(const CheckOptions& options) {
-  LoadProgress news(options.name,
-                    [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
-  const Progress progress([&](std::string_view stage) {
-    news.at(stage);
-    return true;  // Ctrl-C ends the process
-  });
+  const Progress progress = report_stages(options.name);
   Reading reading = read_scene(options.name, {.third = options.third, .progress = progress});
   CompiledScene admission;
   if (reading.scene) {

@@ -1,4 +1,5 @@
 #include "app/commands/commands.h"
+#include "app/commands/output.h"
 
 #include <signal.h>
 
@@ -8,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "app/commands/flight/flight_sound.h"
+#include "app/commands/flight/flight_player.h"
 #include "app/commands/progress_bar.h"
 #include "app/say.h"
 #include "app/session/load_progress.h"
@@ -58,7 +59,7 @@ std::vector<int> ending_signals() {
 int render_command(const RenderOptions& options, bool is_quiet) {
   std::optional<ProgressBar> bar(!is_quiet);
   RenderOptions watched = options;
-  LoadProgress news(options.name, is_quiet ? MessageHandler() : complain);
+  LoadProgress news(options.name, is_quiet ? MessageHandler() : print_error);
   watched.loading = Progress([&](std::string_view stage) {
     news.at(stage);
     return true;  // a signal ends the process
@@ -74,20 +75,19 @@ int render_command(const RenderOptions& options, bool is_quiet) {
   });
   ignore_signals_no_more();
   bar.reset();
-  const auto complain = [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); };
   if (!rendered) {
     const bool was_stopped = interrupted.is_raised();
-    complain(was_stopped ? options.name + ": interrupted before the first sample"
-                         : rendered.error().message);
+    print_error(was_stopped ? options.name + ": interrupted before the first sample"
+                            : rendered.error().message);
     return was_stopped ? exit_code::our_failure : exit_code::wrong_use;
   }
   if (rendered->failure) {
-    complain(rendered->failure->message);
+    print_error(rendered->failure->message);
     return exit_code::our_failure;
   }
   if (!is_quiet) {
     for (const std::string& warning : rendered->warnings) {
-      complain(warning);
+      print_error(warning);
     }
     std::printf("%s: %s, %.2f s, %d %s, %g Hz, peak %s, rms %s%s\n", options.output.c_str(),
                 rendered->name.c_str(), static_cast<double>(rendered->frames) / rendered->rate_hz,
@@ -95,20 +95,20 @@ int render_command(const RenderOptions& options, bool is_quiet) {
                 rendered->rate_hz, db(rendered->peak).c_str(), db(rendered->rms).c_str(),
                 rendered->was_interrupted ? ", interrupted" : "");
     if (rendered->peak > 1.0) {
-      complain("the peak exceeds full scale; pass --limit to avoid clipping");
+      print_error("the peak exceeds full scale; pass --limit to avoid clipping");
     }
     const bool was_asked = is_flight_name(options.name) || !options.score.empty() ||
                            !options.input.empty() || !options.midi.empty();
     if (rendered->peak == 0.0 && rendered->frames > 0 && !was_asked) {
-      complain("the output is silent: nothing excites the model; pass --score or --input");
+      print_error("the output is silent: nothing excites the model; pass --score or --input");
     }
   }
   if (rendered->resets > 0) {
     const bool is_once = rendered->resets == 1;
-    complain(rendered->name + (is_once ? ": a voice" : ": voices") +
-             " became unstable and faded out" +
-             (is_once ? "" : " " + std::to_string(rendered->resets) + " times") +
-             "; the output is not valid");
+    print_error(rendered->name + (is_once ? ": a voice" : ": voices") +
+                " became unstable and faded out" +
+                (is_once ? "" : " " + std::to_string(rendered->resets) + " times") +
+                "; the output is not valid");
   }
   return rendered->was_interrupted ? exit_code::our_failure : exit_code::done;
 }

@@ -1,10 +1,10 @@
 #include "app/commands/export.h"
+#include "app/commands/output.h"
 
 #include <cstdio>
 
 #include "app/exit_code.h"
 #include "app/session/files.h"
-#include "app/session/load_progress.h"
 #include "app/session/loader.h"
 #include "core/compile/compile.h"
 #include "core/model/faust/faust.h"
@@ -40,12 +40,7 @@ int export_to_faust(const ExportOptions& options) {
                  options.output.c_str());
     return exit_code::wrong_use;
   }
-  LoadProgress news(options.name,
-                    [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
-  const Progress progress([&](std::string_view stage) {
-    news.at(stage);
-    return true;  // Ctrl-C ends the process
-  });
+  const Progress progress = report_stages(options.name);
   const auto scene = load_scene(options.name, {.third = options.third, .progress = progress});
   if (!scene) {
     std::fprintf(stderr, "%s\n", scene.error().message.c_str());

@@ -1,4 +1,5 @@
 #include "app/commands/make.h"
+#include "app/commands/output.h"
 
 #include <cstdio>
 
@@ -24,18 +25,14 @@ void warn_if_unstable(const Network& network) {
 }  // namespace
 
 int make(const MakeOptions& options) {
-  const auto complain = [](const std::string& text) {
-    std::fprintf(stderr, "%s\n", text.c_str());
-    return exit_code::wrong_use;
-  };
   const auto network = generate(options.shape);
   if (!network) {
-    return complain(network.error().message);
+    return reject(network.error().message);
   }
   const std::string text = print_network(*network);
   if (text.size() > max_model_bytes) {
-    return complain("the model would exceed the largest size that can be read, " +
-                    std::to_string(max_model_bytes >> 20) + " MiB; use a shorter --name");
+    return reject("the model would exceed the largest size that can be read, " +
+                  std::to_string(max_model_bytes >> 20) + " MiB; use a shorter --name");
   }
   warn_if_unstable(*network);
   if (options.output.empty()) {

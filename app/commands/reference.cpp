@@ -18,7 +18,7 @@ namespace {
 
 using Cells = std::vector<std::string>;
 
-// As Markdown sets what is typed; nothing for nothing.
+// Formats code in Markdown; empty for an empty text.
 std::string code(std::string_view text) {
   return text.empty() ? "" : "`" + std::string(text) + "`";
 }
@@ -77,7 +77,7 @@ void print_commands() {
   }
 }
 
-// Those of /status.reply in its order, then those that only the console tells.
+// Prints the figures of /status.reply in its order, then those of the console alone.
 void print_status() {
   std::vector<const StatusRow*> rows;
   for (const StatusRow& row : status_rows()) {

@@ -36,7 +36,8 @@ Margins margins_of(const Panel& panel) {
   return margins;
 }
 
-// In single quotes gnuplot replaces nothing: neither backslashes nor commands in backquotes.
+// Quotes a text for gnuplot, which runs backquoted commands in double quotes but not in single
+// ones.
 std::string quoted(const std::string& text) {
   std::string safe = "'";
   for (const char c : text) {

@@ -16,7 +16,7 @@ struct Curve {
   std::string data;
 };
 
-// Of all variants of FAUST, only the fastest of each scene is drawn.
+// Draws only the fastest variant of FAUST of each scene.
 std::vector<Curve> curves_of(const std::string& family, const std::vector<Row>& rows) {
   std::vector<Curve> curves;
   const auto add = [&](const Row& row, const std::string& method, double times) {

@@ -13,7 +13,7 @@ namespace ressort::bench {
 // scene was measured.
 plot::Figure cost_figure(const std::string& machine, const std::vector<Row>& rows);
 
-// How many times faster than the best of FAUST each scene is: the kernel of the plan's choice and
+// Speed of each scene relative to the best of FAUST: the kernel of the plan's choice and
 // the engine around it, in double and in float, with a bar from one quartile of the rounds to the
 // other. Without panels where FAUST played nothing.
 plot::Figure faust_figure(const std::string& machine, const std::vector<Row>& rows);

@@ -16,6 +16,7 @@
 #include <thread>
 #include <vector>
 
+#include "app/commands/output.h"
 #include "app/session/files.h"
 #include "core/model/language/expression.h"
 #include "core/progress.h"
@@ -44,34 +45,6 @@ bool is_installed(const std::string& program) {
   return false;
 }
 
-// A temporary folder for the files of the meshers.
-class WorkFolder {
- public:
-  static Result<WorkFolder> make() {
-    std::error_code error;
-    std::string name = (fs::temp_directory_path(error) / "ressort-XXXXXX").string();
-    if (error || mkdtemp(name.data()) == nullptr) {
-      return Error{"cannot create a folder for the mesh: " +
-                   std::error_code(errno, std::generic_category()).message()};
-    }
-    return WorkFolder(name);
-  }
-  WorkFolder(WorkFolder&& other) noexcept : name_(std::exchange(other.name_, {})) {}
-  WorkFolder& operator=(WorkFolder&&) = delete;
-  ~WorkFolder() {
-    std::error_code error;
-    if (!name_.empty()) {
-      fs::remove_all(name_, error);
-    }
-  }
-  std::string file(const std::string& name) const { return name_ + "/" + name; }
-  const std::string& name() const { return name_; }
-
- private:
-  explicit WorkFolder(std::string name) : name_(std::move(name)) {}
-  std::string name_;
-};
-
 // Returns the last lines of a log.
 std::string last_words(const std::string& log) {
   constexpr std::size_t most = 600;
@@ -89,7 +62,7 @@ std::string last_words(const std::string& log) {
 }
 
 // Runs a program in the folder, with its output in the file "log" there.
-Result<Done> run(std::vector<std::string> words, const WorkFolder& folder, double limit_s,
+Result<Done> run(std::vector<std::string> words, const TemporaryFolder& folder, double limit_s,
                  const std::function<bool()>& goes_on) {
   std::vector<char*> arguments;
   for (std::string& word : words) {
@@ -107,7 +80,7 @@ Result<Done> run(std::vector<std::string> words, const WorkFolder& folder, doubl
     prctl(PR_SET_PDEATHSIG, SIGKILL);  // the child ends with this process
     const int out = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
     const int in = open("/dev/null", O_RDONLY | O_CLOEXEC);
-    if (out >= 0 && in >= 0 && chdir(folder.name().c_str()) == 0) {
+    if (out >= 0 && in >= 0 && chdir(folder.path().c_str()) == 0) {
       dup2(in, STDIN_FILENO);
       dup2(out, STDOUT_FILENO);
       dup2(out, STDERR_FILENO);
@@ -161,8 +134,9 @@ std::string gmsh_script(double edge, bool makes_surface_anew) {
 
 using Fill = std::function<Result<TetrahedronMesh>(double edge)>;
 
-Result<TetrahedronMesh> by_gmsh(const ClosedSurface& closed, double edge, const WorkFolder& folder,
-                                const MeshOrder& order, const std::function<bool()>& goes_on) {
+Result<TetrahedronMesh> by_gmsh(const ClosedSurface& closed, double edge,
+                                const TemporaryFolder& folder, const MeshOrder& order,
+                                const std::function<bool()>& goes_on) {
   Error first;
   for (const bool anew : {true, false}) {
     for (const auto& [name, text] : {std::pair("surface.stl", as_stl(closed)),
@@ -191,7 +165,7 @@ Result<TetrahedronMesh> by_gmsh(const ClosedSurface& closed, double edge, const 
 }
 
 Result<TetrahedronMesh> by_tetgen(const ClosedSurface& closed, double edge,
-                                  const WorkFolder& folder, const MeshOrder& order,
+                                  const TemporaryFolder& folder, const MeshOrder& order,
                                   const std::function<bool()>& goes_on) {
   if (auto written = write_text(folder.file("body.smesh"), as_smesh(closed), Existing::replace);
       !written) {
@@ -279,7 +253,7 @@ Result<Meshed> fill_with_tetrahedra(const ClosedSurface& closed, const MeshOrder
         !is_installed(program.name)) {
       continue;
     }
-    const auto folder = WorkFolder::make();
+    const auto folder = TemporaryFolder::make();
     if (!folder) {
       return folder.error();
     }

@@ -3,9 +3,9 @@
 #include <cstdio>
 
 #include "app/commands/body/body.h"
+#include "app/commands/output.h"
 #include "app/exit_code.h"
 #include "app/session/files.h"
-#include "app/session/load_progress.h"
 #include "app/session/loader.h"
 #include "app/session/modes/known_modes.h"
 #include "app/text.h"
@@ -15,11 +15,6 @@
 
 namespace ressort::commands {
 namespace {
-
-int refuse(const std::string& message) {
-  std::fprintf(stderr, "%s\n", message.c_str());
-  return exit_code::wrong_use;
-}
 
 // Returns inputs and outputs, so that the body can be played immediately.
 std::string ports_of(const PlacedModes& body) {
@@ -66,30 +61,25 @@ std::string ports_of(const ModalChain& chain) {
 }  // namespace
 
 int network_body(const NetworkBodyOptions& options) {
-  LoadProgress news(options.input,
-                    [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
-  const Progress progress([&](std::string_view stage) {
-    news.at(stage);
-    return true;  // Ctrl-C ends the process
-  });
+  const Progress progress = report_stages(options.input);
   auto scene = load_scene(options.input, {.progress = progress});
   if (!scene) {
-    return refuse(scene.error().message);
+    return reject(scene.error().message);
   }
   const std::string read[] = {scene->path, scene->model_path};
   if (auto spared = check_not_input(options.output, read); !spared) {
-    return refuse(spared.error().message);
+    return reject(spared.error().message);
   }
   const std::string place = options.chain.empty() ? "" : listen_at(scene->network, options.chain);
   const auto modes = find_modes(scene->network, start_values(*scene),
                                 {.count = options.modes, .progress = progress});
   if (!modes) {
-    return refuse(to_string(finding_in_model(*scene, modes.error())));
+    return reject(to_string(finding_in_model(*scene, modes.error())));
   }
   PlacedModes body = placed_modes(*modes);
   body.name = is_identifier(scene->name) ? scene->name : "body";
   if (body.modes.empty() || body.places.empty()) {
-    return refuse(
+    return reject(
         options.input +
         ": no mode is both driven by an input and heard at an output, so there is no body");
   }
@@ -102,7 +92,7 @@ int network_body(const NetworkBodyOptions& options) {
   if (!options.chain.empty()) {
     const auto chain = chain_of(body, place);
     if (!chain) {
-      return refuse(options.input + ": " + chain.error().message);
+      return reject(options.input + ": " + chain.error().message);
     }
     text = "# A chain with the response of " + scene->name + " at " + options.chain +
            "; largest error of a T60: " + fixed(chain->worst_t60_percent, 2) + " %.\n" +

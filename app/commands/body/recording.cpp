@@ -5,12 +5,9 @@
 #include <cstdio>
 
 #include "app/commands/body/body.h"
-#include "app/commands/body/recording_picture.h"
-#include "app/commands/body/recording_text.h"
-#include "app/commands/put_figure.h"
+#include "app/commands/output.h"
 #include "app/exit_code.h"
 #include "app/session/files.h"
-#include "app/session/load_progress.h"
 #include "app/session/sound_file.h"
 #include "app/text.h"
 #include "core/identification/identify.h"
@@ -45,11 +42,6 @@ Result<Recording> read_recording(const std::string& path, bool& was_longer) {
   return recording;
 }
 
-int complain_of(const std::string& text) {
-  std::fprintf(stderr, "%s\n", text.c_str());
-  return exit_code::wrong_use;
-}
-
 }  // namespace
 
 Result<Identification> identify_recording(const std::string& path, const IdentifyOptions& options,
@@ -74,26 +66,20 @@ int recording_body(const BodyOptions& options) {
   const std::string read[] = {options.input};
   for (const std::string& written : {options.output, options.picture}) {
     if (auto spared = check_not_input(written, read); !spared) {
-      return complain_of(spared.error().message);
+      return reject(spared.error().message);
     }
   }
   if (!options.picture.empty() && !options.picture.ends_with(".svg")) {
-    return complain_of("--picture: expected a file that ends in .svg, found '" + options.picture +
-                       "'");
+    return reject("--picture: expected a file that ends in .svg, found '" + options.picture + "'");
   }
   if (auto found = plot::check_gnuplot(); !options.picture.empty() && !found) {
-    return complain_of(options.picture + ": " + found.error().message);
+    return reject(options.picture + ": " + found.error().message);
   }
-  LoadProgress news(options.input,
-                    [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
-  const Progress progress([&](std::string_view stage) {
-    news.at(stage);
-    return true;  // Ctrl-C ends the process
-  });
+  const Progress progress = report_stages(options.input);
   const auto found = identify_recording(
       options.input, {.most_modes = options.most_modes, .floor_db = options.floor_db}, progress);
   if (!found) {
-    return complain_of(found.error().message);
+    return reject(found.error().message);
   }
   for (const std::string& warning : found->warnings) {
     std::fprintf(stderr, "%s: warning: %s\n", options.input.c_str(), warning.c_str());

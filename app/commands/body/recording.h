@@ -1,9 +1,9 @@
-// app/commands: finds the modes in a recording.
+// app/commands: the modes in a recording, as a model, as JSON and as a figure.
 #pragma once
 
 #include <string>
 
-#include "app/rooms.h"
+#include "app/plot/plot.h"
 #include "core/identification/identify.h"
 #include "core/progress.h"
 #include "core/result.h"
@@ -14,5 +14,21 @@ namespace ressort::commands {
 // file name. Blocks. [any thread but audio]
 Result<Identification> identify_recording(const std::string& path, const IdentifyOptions& options,
                                           const Progress& progress);
+
+// Makes a label of a file name, from its letters, digits and _; "body" if none is left.
+std::string label_of_file(const std::string& path);
+
+// Returns a model of a body with the place `hit` and one place per channel (`mic`, `left` and
+// `right`, or `mic1` and so on), its modes with their standard deviations, a force input, and a
+// position output per channel.
+std::string body_model(const Identification& found, const std::string& label,
+                       const std::string& source, double mass);
+
+// Returns modes, residual and warnings as one JSON object.
+std::string identification_json(const Identification& found, double mass);
+
+// Three panels over frequency: the spectrum of the recording with the peak of each mode, the T60 of
+// each mode with its standard deviation, and the spectrum of the residual.
+plot::Figure recording_figure(const Identification& found, const std::string& title);
 
 }  // namespace ressort::commands

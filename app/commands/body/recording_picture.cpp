@@ -1,4 +1,4 @@
-#include "app/commands/body/recording_picture.h"
+#include "app/commands/body/recording.h"
 
 #include <algorithm>
 #include <bit>

@@ -1,4 +1,4 @@
-#include "app/commands/body/recording_text.h"
+#include "app/commands/body/recording.h"
 
 #include <algorithm>
 #include <cmath>
@@ -23,7 +23,7 @@ std::string number(const char* form, double value) {
   return text;
 }
 
-// With as many digits as are known, and one more; at most twelve.
+// Prints the known digits of a number and one more, at most twelve.
 std::string known_digits(double value, double deviation) {
   constexpr int most = 12;
   const double share = deviation / std::fabs(value);

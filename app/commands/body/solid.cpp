@@ -9,8 +9,8 @@
 #include <filesystem>
 
 #include "app/commands/body/shapes.h"
+#include "app/commands/output.h"
 #include "app/commands/progress_bar.h"
-#include "app/commands/put_figure.h"
 #include "app/exit_code.h"
 #include "app/realtime/lockfree.h"
 #include "app/session/files.h"
@@ -284,18 +284,14 @@ std::vector<std::vector<std::string>> material_table() {
 }
 
 int solid_body(const SolidBodyOptions& options) {
-  const auto complain = [](const std::string& text) {
-    std::fprintf(stderr, "%s\n", text.c_str());
-    return exit_code::wrong_use;
-  };
   const auto choice = choose_material(options);
   if (!choice) {
-    return complain(choice.error().message);
+    return reject(choice.error().message);
   }
   for (const std::string& written : {options.output, options.picture}) {
     const std::string read[] = {options.input};
     if (const auto spared = check_not_input(written, read); !spared) {
-      return complain(spared.error().message);
+      return reject(spared.error().message);
     }
   }
   watch_for_interrupt();
@@ -315,7 +311,7 @@ int solid_body(const SolidBodyOptions& options) {
       std::fprintf(stderr, "%s: interrupted\n", options.input.c_str());
       return exit_code::our_failure;
     }
-    return complain(error.message);
+    return reject(error.message);
   };
   try {
     const auto closed = read_solid(options, progress);
@@ -324,8 +320,8 @@ int solid_body(const SolidBodyOptions& options) {
     }
     const Box3 box = box_around(closed->surface.points);
     if (box.diagonal() > very_large) {
-      complain("warning: the solid is " + digits(box.diagonal(), 3) +
-               " m large; for a file in millimetres, pass --scale 0.001");
+      print_error("warning: the solid is " + digits(box.diagonal(), 3) +
+                  " m large; for a file in millimetres, pass --scale 0.001");
     }
     share = 0.1;
     const auto meshed =

@@ -12,9 +12,8 @@
 #include <fstream>
 
 #include "app/commands/chart/judge.h"
-#include "app/commands/chart/picture.h"
+#include "app/commands/output.h"
 #include "app/commands/progress_bar.h"
-#include "app/commands/put_figure.h"
 #include "app/exit_code.h"
 #include "app/realtime/lockfree.h"
 #include "app/session/files.h"
@@ -31,10 +30,6 @@ constexpr int most_rounds = 100;
 Flag interrupted;  // by Ctrl-C
 
 using ReportProgress = std::function<bool(const std::string&)>;
-
-void complain(const std::string& text) {
-  std::fprintf(stderr, "%s\n", text.c_str());
-}
 
 // Program, date and processor, for the caption of the figures.
 std::string provenance() {
@@ -63,7 +58,7 @@ struct PlayedWay {
   Waves waves;
 };
 
-// Whether any output of the published scheme moves.
+// Returns whether any output of the published scheme moves.
 bool sounds(const ChartScene& scene, Isa isa) {
   auto made = make_way(scene, {.name = "direct", .method = Method::direct}, heard_s, isa);
   if (!made) {
@@ -183,7 +178,7 @@ int write_all(const ChartOptions& options, const std::vector<ChartSheet>& sheets
   std::printf("%s: %s\n", (folder / "chart.csv").c_str(),
               counted(sheets.size(), "scene", "scenes").c_str());
   if (const auto found = plot::check_gnuplot(); !found) {
-    complain("no figures: " + found.error().message);
+    print_error("no figures: " + found.error().message);
     return exit_code::done;
   }
   for (const ChartSheet& sheet : sheets) {
@@ -251,15 +246,13 @@ int chart(const ChartOptions& options) {
   std::error_code error;
   std::filesystem::create_directories(options.folder, error);
   if (error) {
-    complain("cannot create the folder '" + options.folder + "': " + error.message());
-    return exit_code::wrong_use;
+    return reject("cannot create the folder '" + options.folder + "': " + error.message());
   }
   std::vector<ChartScene> scenes;
   for (const std::string& name : options.scenes.empty() ? reference_scenes() : options.scenes) {
     auto scene = chart_scene(name);
     if (!scene) {
-      complain(scene.error().message);
-      return exit_code::wrong_use;
+      return reject(scene.error().message);
     }
     scenes.push_back(*std::move(scene));
   }
@@ -274,15 +267,14 @@ int chart(const ChartOptions& options) {
           return !interrupted.is_raised();
         });
     if (!sheet) {
-      complain(sheet.error().message);
-      return exit_code::wrong_use;
+      return reject(sheet.error().message);
     }
     if (!interrupted.is_raised()) {
       sheets.push_back(*std::move(sheet));
     }
   }
   if (interrupted.is_raised()) {
-    complain("interrupted; the finished scenes are written");
+    print_error("interrupted; the finished scenes are written");
   }
   const int code = sheets.empty() ? exit_code::our_failure : write_all(options, sheets);
   return interrupted.is_raised() ? exit_code::our_failure : code;

@@ -1,4 +1,4 @@
-#include "app/commands/chart/picture.h"
+#include "app/commands/chart/table.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-// app/commands: the results of the chart, as a table. Pure.
+// app/commands: the results of the chart, as a table and as figures. Pure.
 #pragma once
 
 #include <array>
@@ -8,10 +8,11 @@
 #include <vector>
 
 #include "app/commands/chart/ways.h"
+#include "app/plot/plot.h"
 
 namespace ressort::commands {
 
-// What errors are measured against.
+// Solutions that errors are measured against.
 enum ChartReference : std::size_t {
   published,  // the published scheme at 44,100 Hz in long double
   physical    // the continuous network of the same M, K and Z
@@ -37,7 +38,7 @@ struct ChartSheet {
   std::vector<ChartRow> rows;
 };
 
-// What a method costs, and how good it is.
+// Cost and accuracy of a method.
 struct Trade {
   double ns = 0.0;
   double snr_db = 0.0;
@@ -52,5 +53,11 @@ void find_fronts(ChartSheet& sheet);
 
 // Writes all sheets as CSV: comments that explain the columns, their names, a line per row.
 std::string chart_csv(const std::vector<ChartSheet>& sheets, const std::string& made_by);
+
+// One scene against both references.
+plot::Figure sheet_figure(const ChartSheet& sheet, const std::string& made_by);
+
+// All scenes against the continuous network.
+plot::Figure overview_figure(const std::vector<ChartSheet>& sheets, const std::string& made_by);
 
 }  // namespace ressort::commands

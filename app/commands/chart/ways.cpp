@@ -19,11 +19,6 @@ const NamedBudget every_method[] = {{"", ""}, {"passive", "passive=always"}};
 const NamedBudget plans_choice[] = {
     {"auto", ""}, {"auto cents=1", "cents=1"}, {"auto passive", "passive=always"}};
 
-// Only methods whose error falls with the rate are oversampled.
-bool gains_by_oversampling(Method method) {
-  return method == Method::direct;
-}
-
 std::string together(const std::string& a, const std::string& b) {
   return a + (a.empty() || b.empty() ? "" : " ") + b;
 }
@@ -34,7 +29,7 @@ void add_method(std::vector<Way>& ways, Method method) {
     const std::string line = together(name, asked.name);
     ways.push_back({.name = line, .line = line, .method = method, .budget = asked.budget});
     for (const unsigned times : oversamplings) {
-      if (gains_by_oversampling(method)) {
+      if (method == Method::direct) {  // the others have the same error at every rate
         const std::string label = std::to_string(times) + "x";
         ways.push_back({.name = line + " " + label,
                         .line = line,

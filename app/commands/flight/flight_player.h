@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "app/commands/offline.h"
 #include "app/realtime/process.h"
 #include "app/session/flight/flight.h"
 #include "core/result.h"
@@ -36,5 +37,13 @@ class FlightPlayer {
   std::size_t channels_ = 0;
   std::int64_t heard_from_ = 0;  // frame
 };
+
+// Renders the last `seconds` of the flight that `name` refers to (default flight_heard_s), like
+// render().
+Result<Rendered> render_flight(const RenderOptions& options,
+                               const std::function<bool(double)>& progress);
+
+// Renders the same samples for playing by a Process.
+Result<SampleTape> tape_of(const FlightPlayer& player, const std::function<bool(double)>& progress);
 
 }  // namespace ressort::commands

@@ -9,8 +9,8 @@
 #include <thread>
 
 #include "app/commands/gallery/page.h"
+#include "app/commands/output.h"
 #include "app/commands/progress_bar.h"
-#include "app/commands/put_figure.h"
 #include "app/exit_code.h"
 #include "app/realtime/thread_pool.h"
 #include "app/session/files.h"
@@ -224,25 +224,21 @@ std::vector<ShownPreset> show_all(const GalleryOptions& options,
 }  // namespace
 
 int gallery(const GalleryOptions& options, const GoesOn& goes_on) {
-  const auto complain = [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); };
   const std::vector<std::string> names = known_presets();
   if (names.empty()) {
-    complain("no presets found beside '" + models_folder() + "'");
-    return exit_code::wrong_use;
+    return reject("no presets found beside '" + models_folder() + "'");
   }
   if (const auto found = plot::check_gnuplot(); !found) {
-    complain(found.error().message);
-    return exit_code::wrong_use;
+    return reject(found.error().message);
   }
   std::error_code error;
   std::filesystem::create_directories(options.folder, error);
   if (error) {
-    complain("cannot create the folder '" + options.folder + "': " + error.message());
-    return exit_code::wrong_use;
+    return reject("cannot create the folder '" + options.folder + "': " + error.message());
   }
   const std::vector<ShownPreset> shown = show_all(options, names, goes_on);
   if (!goes_on()) {
-    complain("interrupted; no page is written");
+    print_error("interrupted; no page is written");
     return exit_code::our_failure;
   }
   const std::string made = std::string("ressort ") + version + " (" + commit + "), " + today() +
@@ -260,7 +256,7 @@ int gallery(const GalleryOptions& options, const GoesOn& goes_on) {
   int code = exit_code::done;
   for (const ShownPreset& preset : shown) {
     if (!preset.failure.empty()) {
-      complain(preset.name + ": not played: " + preset.failure);
+      print_error(preset.name + ": not played: " + preset.failure);
       code = exit_code::our_failure;
     }
   }

@@ -3,11 +3,10 @@
 #include <cstdio>
 
 #include "app/commands/modes/shapes_figure.h"
-#include "app/commands/put_figure.h"
+#include "app/commands/output.h"
 #include "app/exit_code.h"
 #include "app/session/compile_scene.h"
 #include "app/session/files.h"
-#include "app/session/load_progress.h"
 #include "app/session/loader.h"
 #include "app/session/modes/known_modes.h"
 #include "app/text.h"
@@ -17,11 +16,6 @@
 
 namespace ressort::commands {
 namespace {
-
-int refuse(const std::string& message) {
-  std::fprintf(stderr, "%s\n", message.c_str());
-  return exit_code::wrong_use;
-}
 
 // Applies --decay and --tune to the scene.
 Result<Done> tune(Scene& scene, const std::vector<double>& parameters, const ModesOptions& options,
@@ -74,28 +68,23 @@ int modes_command(const ModesOptions& options) {
   const bool is_tuning = !options.frequencies_hz.empty() || !options.decay.empty();
   const std::string wanted = is_tuning ? ".mdl" : ".svg";
   if (!options.output.empty() && !options.output.ends_with(wanted)) {
-    return refuse("-o: expected a file that ends in " + wanted + ", found '" + options.output +
+    return reject("-o: expected a file that ends in " + wanted + ", found '" + options.output +
                   "'");
   }
   if (auto found = plot::check_gnuplot(); !options.output.empty() && !is_tuning && !found) {
-    return refuse(options.output + ": " + found.error().message);
+    return reject(options.output + ": " + found.error().message);
   }
-  LoadProgress news(options.name,
-                    [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
-  const Progress progress([&](std::string_view stage) {
-    news.at(stage);
-    return true;  // Ctrl-C ends the process
-  });
+  const Progress progress = report_stages(options.name);
   auto scene = load_scene(options.name, {.third = options.third, .progress = progress});
   if (!scene) {
-    return refuse(scene.error().message);
+    return reject(scene.error().message);
   }
   for (const std::string& warning : scene->warnings) {
     std::fprintf(stderr, "%s\n", warning.c_str());
   }
   const std::string read[] = {scene->path, scene->model_path};
   if (auto spared = check_not_input(options.output, read); !spared) {
-    return refuse(spared.error().message);
+    return reject(spared.error().message);
   }
   const std::vector<double> parameters = start_values(*scene);
   const ModeOptions search{
@@ -105,7 +94,7 @@ int modes_command(const ModesOptions& options) {
       .progress = progress};
   const std::string as_written = options.output.empty() || is_tuning ? "" : scene->name;
   if (auto tuned = tune(*scene, parameters, options, search); !tuned) {
-    return refuse(to_string(finding_of(scene->model_path, "", tuned.error())));
+    return reject(to_string(finding_of(scene->model_path, "", tuned.error())));
   }
   plot::Figure figure;
   Result<KnownModes> modes = Error{};
@@ -121,7 +110,7 @@ int modes_command(const ModesOptions& options) {
     modes = known_modes(*scene, parameters, search);
   }
   if (!modes) {
-    return refuse(to_string(finding_of(scene->model_path, "", modes.error())));
+    return reject(to_string(finding_of(scene->model_path, "", modes.error())));
   }
   // Warns about divergence without oscillation, which is not a mode.
   if (search.scheme == ModeScheme::published) {

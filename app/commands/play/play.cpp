@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "app/commands/commands.h"
-#include "app/commands/flight/flight_sound.h"
+#include "app/commands/flight/flight_player.h"
 #include "app/commands/play/announcer.h"
 #include "app/commands/play/kept_stage.h"
 #include "app/commands/smf/midi_player.h"

@@ -1,15 +1,13 @@
 #include "app/commands/timbre/describe.h"
 
-#include <stdlib.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
 
 #include "app/commands/body/recording.h"
 #include "app/commands/offline.h"
+#include "app/commands/output.h"
 #include "app/commands/progress_bar.h"
-#include "app/commands/put_figure.h"
 #include "app/commands/timbre/describe_text.h"
 #include "app/commands/timbre/sweep.h"
 #include "app/exit_code.h"
@@ -35,33 +33,6 @@ bool names_sound(const std::string& name) {
                  [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
   return std::find(sound_endings().begin(), sound_endings().end(), ending) != sound_endings().end();
 }
-
-// A temporary folder for a rendered sound.
-class TemporaryFolder {
- public:
-  static Result<TemporaryFolder> make() {
-    std::error_code error;
-    std::string path = (fs::temp_directory_path(error) / "ressort-XXXXXX").string();
-    if (error || mkdtemp(path.data()) == nullptr) {
-      return Error{"cannot create a folder in '" + fs::path(path).parent_path().string() +
-                   "' for the rendered sound"};
-    }
-    return TemporaryFolder(std::move(path));
-  }
-  TemporaryFolder(TemporaryFolder&& other) noexcept : path_(std::exchange(other.path_, {})) {}
-  TemporaryFolder& operator=(TemporaryFolder&&) = delete;
-  ~TemporaryFolder() {
-    std::error_code error;
-    if (!path_.empty()) {
-      fs::remove_all(path_, error);
-    }
-  }
-  std::string file(const std::string& name) const { return path_ + "/" + name; }
-
- private:
-  explicit TemporaryFolder(std::string path) : path_(std::move(path)) {}
-  std::string path_;
-};
 
 // Replaces the name of a temporary file in a message.
 std::string renamed(std::string message, const std::string& path, const std::string& name) {
@@ -137,8 +108,7 @@ Result<Description> describe_note(const DescribeOptions& options, const Progress
 
 Result<Description> describe_model(const DescribeOptions& options,
                                    const DescriptionProgress& progress, const Warn& warn) {
-  LoadProgress news(options.name,
-                    [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
+  LoadProgress news(options.name, print_error);
   const Progress loading([&](std::string_view stage) {
     news.at(stage);
     return progress(0.0);
@@ -202,23 +172,19 @@ Result<Description> description_of(const DescribeOptions& options,
 }
 
 int describe(const DescribeOptions& options, const std::function<bool()>& goes_on) {
-  const auto refuse = [](const std::string& message) {
-    std::fprintf(stderr, "%s\n", message.c_str());
-    return exit_code::wrong_use;
-  };
   for (const std::string& output : options.outputs) {
     const bool is_table = !options.swept.empty() && output.ends_with(".csv");
     if (!output.ends_with(".svg") && !is_table) {
-      return refuse("-o: expected a file that ends in .svg" +
+      return reject("-o: expected a file that ends in .svg" +
                     std::string(options.swept.empty() ? "" : " or .csv") + ", found '" + output +
                     "'");
     }
     if (auto found = plot::check_gnuplot(); !is_table && !found) {
-      return refuse(output + ": " + found.error().message);
+      return reject(output + ": " + found.error().message);
     }
     const std::string read[] = {options.name};
     if (auto spared = check_not_input(output, read); !spared) {
-      return refuse(spared.error().message);
+      return reject(spared.error().message);
     }
   }
   if (!options.swept.empty()) {
@@ -240,7 +206,7 @@ int describe(const DescribeOptions& options, const std::function<bool()>& goes_o
     return exit_code::our_failure;
   }
   if (!description) {
-    return refuse(description.error().message);
+    return reject(description.error().message);
   }
   for (const std::string& output : options.outputs) {
     const plot::Figure figure = description_figure(*description, options.how);

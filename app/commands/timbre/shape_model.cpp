@@ -1,4 +1,5 @@
 #include "app/commands/timbre/shape_model.h"
+#include "app/commands/output.h"
 
 #include <algorithm>
 #include <cmath>
@@ -36,7 +37,7 @@ struct Liked {
   double rate_hz = 0.0;
 };
 
-// Of the loudest frame; a model is described by the first frame after a strike.
+// Figures of the loudest frame; a model is described by the first frame after a strike.
 Result<Liked> liked(const std::string& path, const Progress& progress,
                     const std::function<bool()>& goes_on) {
   const auto sound = describe_sound(path, {}, [&](double) { return goes_on(); });
@@ -157,8 +158,7 @@ int shape_model(const ShapeOptions& options, const std::function<bool()>& goes_o
   if (!options.output.empty() && !options.output.ends_with(".toml")) {
     return refuse("-o: expected a file that ends in .toml, found '" + options.output + "'");
   }
-  LoadProgress news(options.name,
-                    [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
+  LoadProgress news(options.name, print_error);
   const Progress progress([&](std::string_view stage) {
     news.at(stage);
     return goes_on();

@@ -6,8 +6,8 @@
 #include <limits>
 #include <set>
 
+#include "app/commands/output.h"
 #include "app/commands/progress_bar.h"
-#include "app/commands/put_figure.h"
 #include "app/exit_code.h"
 #include "app/session/files.h"
 #include "app/session/timbre/timbre_figures.h"
@@ -162,25 +162,21 @@ std::string to_csv(const SweepTable& table, const std::vector<SweptParameter>& s
 }
 
 int sweep(const DescribeOptions& options, const std::function<bool()>& goes_on) {
-  const auto refuse = [](const std::string& message) {
-    std::fprintf(stderr, "%s\n", message.c_str());
-    return exit_code::wrong_use;
-  };
   SweepTable table{.of = options.name, .names = figure_names()};
   const auto pictures = std::count_if(options.outputs.begin(), options.outputs.end(),
                                       [](const auto& path) { return path.ends_with(".svg"); });
   if (options.as_json) {
-    return refuse("--json: not available with --sweep, which writes CSV");
+    return reject("--json: not available with --sweep, which writes CSV");
   }
   // Checks the figure before the work starts.
   if (auto figure = sweep_figure(table, options); pictures > 0 && !figure) {
-    return refuse(figure.error().message);
+    return reject(figure.error().message);
   }
   std::size_t count = 1;
   for (const SweptParameter& one : options.swept) {
     count *= static_cast<std::size_t>(one.steps);
     if (count > most_steps) {
-      return refuse("--sweep: more than " + std::to_string(most_steps) + " sounds");
+      return reject("--sweep: more than " + std::to_string(most_steps) + " sounds");
     }
   }
   std::set<std::string> told;
@@ -210,7 +206,7 @@ int sweep(const DescribeOptions& options, const std::function<bool()>& goes_on) 
         break;
       }
       if (!description && table.rows.empty()) {
-        return refuse(description.error().message);
+        return reject(description.error().message);
       }
       if (!description) {
         tell(place.substr(1) + ": " + description.error().message);

@@ -1,5 +1,5 @@
-// The bells among the models against the bells that they are: solids of their profiles,
-// filled with tetrahedra by gmsh and solved by the finite elements of `ressort body`.
+// Compares the bell models with their solids: their profiles, meshed by gmsh and solved by the
+// finite elements of `ressort body`.
 #include "tests/support/bells.h"
 
 #include <complex>
@@ -17,7 +17,7 @@ namespace {
 
 using namespace support;
 
-// The partials of a model with hum, prime and so on in its order: pairs by their mean.
+// Partials of a model in the order hum, prime and so on; pairs are averaged.
 std::vector<double> partials_of(const std::string& name) {
   const auto text = read_text(std::string(RESSORT_SOURCE) + "/models/" + name + ".mdl", 1 << 20);
   REQUIRE(text);
@@ -33,8 +33,8 @@ std::vector<double> partials_of(const std::string& name) {
   return partials;
 }
 
-// Of how many meridians a mode is: what is the largest of its radial motion around the axis. The
-// crown, which turns with some, is left away.
+// Number of nodal meridians of a mode: the largest Fourier component of the radial motion around
+// the axis. The crown, which turns in some modes, is left out.
 int meridians(const SolidMesh& mesh, const SolidModes& modes, std::size_t mode) {
   std::array<std::complex<double>, 12> around{};
   double widest = 0.0;
@@ -58,7 +58,7 @@ int meridians(const SolidMesh& mesh, const SolidModes& modes, std::size_t mode) 
   return static_cast<int>(largest - around.begin());
 }
 
-// Those of the bell's table. Hz
+// Partials in the table of the bell, Hz.
 std::vector<double> partials_of_solid(const Bell& bell) {
   const auto closed = close_surface(bell_surface(bell.profile, 80, 120), Progress());
   REQUIRE(closed);
@@ -84,7 +84,7 @@ std::vector<double> partials_of_solid(const Bell& bell) {
 
 }  // namespace
 
-TEST_CASE("a church bell has the partials that bells are tuned to", "[bells]") {
+TEST_CASE("A church bell has the partials that bells are tuned to", "[bells]") {
   for (const auto& [name, third] :
        {std::pair("ChurchBell", 1.2), std::pair("MajorBell", 1.25), std::pair("Bourdon", 1.2)}) {
     const std::vector<double> partials = partials_of(name);
@@ -96,12 +96,12 @@ TEST_CASE("a church bell has the partials that bells are tuned to", "[bells]") {
   }
 }
 
-TEST_CASE("a handbell has a twelfth above its lowest partial", "[bells]") {
+TEST_CASE("A handbell has a twelfth above its lowest partial", "[bells]") {
   const std::vector<double> partials = partials_of("HandBell");
   CHECK(partials[1] == Approx(3.0 * partials[0]).epsilon(2e-3));
 }
 
-TEST_CASE("the bells' partials are those of their solids", "[.][bells_everywhere]") {
+TEST_CASE("Partials of the bells are those of their solids", "[.][bells_everywhere]") {
   if (std::system("command -v gmsh >/dev/null 2>&1") != 0) {
     WARN("not run: no gmsh");
     return;

@@ -6,7 +6,6 @@
 #include <numbers>
 
 #include "app/commands/chart/judge.h"
-#include "app/commands/chart/picture.h"
 #include "core/analysis/continuous.h"
 #include "core/engine/reference.h"
 #include "core/model/language/mdl.h"
@@ -39,14 +38,14 @@ const Way direct{.name = "direct", .method = Method::direct};
 
 }  // namespace
 
-TEST_CASE("what nothing beats is on the front", "[chart]") {
+TEST_CASE("Trades that no other trade beats are on the Pareto front", "[chart]") {
   const double nan = std::nan("");
   const std::vector<Trade> trades = {{10.0, 40.0}, {100.0, 60.0}, {100.0, 50.0},  {50.0, 40.0},
                                      {5.0, nan},   {10.0, 40.0},  {1000.0, 61.0}, {1.0, -3.0}};
   CHECK(front_of(trades) == std::vector<bool>{true, true, false, false, false, false, true, true});
 }
 
-TEST_CASE("the continuous string has the closed form's partials", "[chart]") {
+TEST_CASE("Partials of the continuous string follow the closed form", "[chart]") {
   const Continuous string = continuous_of(scene_called("string50"));
   REQUIRE(string.is_proportional);
   REQUIRE(string.modes.size() == 50);
@@ -61,7 +60,7 @@ TEST_CASE("the continuous string has the closed form's partials", "[chart]") {
   CHECK(string.modes[0].frequency_hz() == Approx(136.700388536816).epsilon(1e-12));
 }
 
-TEST_CASE("the continuous triangle has the published partials", "[chart]") {
+TEST_CASE("The continuous triangle has the published partials", "[chart]") {
   const Continuous triangle = continuous_of(scene_called("triangle"));
   CHECK_FALSE(triangle.is_proportional);
   REQUIRE(triangle.modes.size() == 3);
@@ -73,7 +72,7 @@ TEST_CASE("the continuous triangle has the published partials", "[chart]") {
   }
 }
 
-TEST_CASE("the textbook steps as the textbook simulator does", "[chart]") {
+TEST_CASE("The reference scheme steps like the textbook simulator", "[chart]") {
   for (const scenes::Example& example : scenes::nine_instruments()) {
     if (example.moving > 400) {
       continue;
@@ -107,12 +106,12 @@ TEST_CASE("the textbook steps as the textbook simulator does", "[chart]") {
       }
     }
     CHECK(peak > 0.0);
-    // Velocities of hands are rounded to double here and not there; bows and picks feel that.
+    // Velocities of inputs are rounded to double here only, which bows and plucks amplify.
     CHECK(worst <= (example.is_linear ? 1e-12 : 1e-9) * peak);
   }
 }
 
-TEST_CASE("every method is as far from the continuous network as theory has it", "[chart]") {
+TEST_CASE("Errors against the continuous network are those of the theory", "[chart]") {
   const auto seconds = static_cast<std::size_t>(heard_s * 44100.0);
   struct Known {
     const char* scene;
@@ -131,15 +130,15 @@ TEST_CASE("every method is as far from the continuous network as theory has it",
     MadeWay way = made(starts.at(1), direct);
     CHECK(signal_to_error_db(references->published, render_way(way, seconds), 0, seconds) >= 200.0);
     CHECK(physical_db(direct) == Approx(known.published_db).margin(0.5));
-    // Of second order: 12 dB less at each doubling of the rate, once all partials are resolved.
+    // Second order: 12 dB less at each doubling of the rate, once all partials are resolved.
     CHECK(physical_db({.name = "4x", .method = Method::direct, .oversampling = 4}) >=
           known.published_db + 16.0);
     CHECK(physical_db({.name = "exact", .method = Method::modal, .budget = "cents=1"}) >= 200.0);
   }
 }
 
-TEST_CASE("what rests as it starts is struck, and the sheet says so", "[chart]") {
-  // Off the origin and still at rest: nothing pulls.
+TEST_CASE("A network at rest is struck, and the sheet says so", "[chart]") {
+  // Displaced from the origin but at rest: no link pulls.
   const ParsedNetwork parsed = parse_network(
       "@m mass 1. 1. 0.\n@n mass 1. 1. 0.\n@r springDamper @m @n 0.1 0.001\n@out1 posOutput @m\n");
   ChartScene scene{.name = "pair", .network = parsed.network, .is_linear = true};
@@ -151,7 +150,7 @@ TEST_CASE("what rests as it starts is struck, and the sheet says so", "[chart]")
   CHECK(sheet->about.find("an impulse at the first mass") != std::string::npos);
 }
 
-TEST_CASE("energy is watched, and a hard contact is caught gaining it", "[chart]") {
+TEST_CASE("The energy test finds a hard contact that gains energy", "[chart]") {
   const ChartScene string = scene_called("string50");
   MadeWay way = made(string, direct);
   const auto lossy = watch_energy(string, way, 0.25);

@@ -1,5 +1,5 @@
-// Whole files described: against the vectors of the definitions, and a model's modes in closed form
-// against its render.
+// Descriptions of files compared with their definitions, and of modes in closed form compared with
+// renders.
 #include "app/commands/timbre/description.h"
 
 #include <cmath>
@@ -69,7 +69,7 @@ std::vector<double> bell() {
 
 }  // namespace
 
-TEST_CASE("a file's frame is described as elsewhere, and as among all others", "[description]") {
+TEST_CASE("A frame has the same figures alone and among all frames", "[description]") {
   const Folder folder;
   const std::vector<double> sound = bell();
   const std::string path = write_sound(folder, "bell.wav", {sound});
@@ -84,7 +84,7 @@ TEST_CASE("a file's frame is described as elsewhere, and as among all others", "
   CHECK(value(later.frames[0].values, "centroid_hz") == near(227.319045));
   CHECK(value(later.frames[0].values, "spread_hz") == near(42.6790185));
 
-  // All frames: every hop, the last one whole, and each as if it stood alone.
+  // All frames, one per hop, each equal to the description of that frame alone.
   const auto all = described(path, {.hop = 1000, .f0_hz = 220.0});
   CHECK(all.frames.size() == (60000 - 2048) / 1000 + 1);
   const auto alone = described(path, {.hop = 1000, .at = 24000, .f0_hz = 220.0});
@@ -99,7 +99,7 @@ TEST_CASE("a file's frame is described as elsewhere, and as among all others", "
   CHECK(described(path, {.hop = 100000}).frames.size() == 1);
 }
 
-TEST_CASE("channels are described by their mean", "[description]") {
+TEST_CASE("Channels are averaged", "[description]") {
   const Folder folder;
   const std::vector<double> sound = bell();
   std::vector<double> twice = sound;
@@ -113,7 +113,7 @@ TEST_CASE("channels are described by their mean", "[description]") {
   CHECK(value(two.frames[0].values, "rms") == value(one.frames[0].values, "rms"));
 }
 
-TEST_CASE("a file's attack and decay are described as its envelope is", "[description]") {
+TEST_CASE("Attack and decay of a file are those of its envelope", "[description]") {
   const Folder folder;
   std::vector<double> sound;
   for (int n = 0; n < 96000; ++n) {
@@ -125,13 +125,13 @@ TEST_CASE("a file's attack and decay are described as its envelope is", "[descri
   CHECK(note.temporal->temporal_centroid_s == Approx(0.1498184).margin(3e-4));
   CHECK(note.temporal->effective_duration_s == Approx(0.1386458).margin(5e-3));
   CHECK(*note.f0_hz == Approx(440.0).epsilon(1e-4));
-  // The median leaves out what is 60 dB below the loudest: half of this one.
+  // The median leaves out frames 60 dB below the loudest: half of this sound.
   const auto statistics = statistics_of(note);
   CHECK(value(statistics.median, "rms") > 1e-3);
   CHECK(value(statistics.median, "centroid_hz") == Approx(440.0).epsilon(5e-3));
 }
 
-TEST_CASE("what cannot be described is told", "[description]") {
+TEST_CASE("Sounds that cannot be described give errors", "[description]") {
   const Folder folder;
   const auto complaint = [&](const std::vector<double>& sound, const DescriptionOptions& options) {
     const auto description =
@@ -152,7 +152,7 @@ TEST_CASE("what cannot be described is told", "[description]") {
                                       [](double share) { return share < 0.6; });
   REQUIRE_FALSE(stopped);
   CHECK(stopped.error().message == description_stopped);
-  // Silence has frames, and nothing to say of them.
+  // Silence has frames without figures.
   const auto silence = described(write_sound(folder, "x.wav", {std::vector<double>(5000)}));
   CHECK(silence.frames.size() == 6);
   CHECK_FALSE(silence.temporal);
@@ -160,7 +160,7 @@ TEST_CASE("what cannot be described is told", "[description]") {
   CHECK_FALSE(statistics_of(silence).median[figure_number("centroid_hz")]);
 }
 
-TEST_CASE("a model's modes are described as its render is", "[description]") {
+TEST_CASE("Modes in closed form have the figures of the render", "[description]") {
   const Folder folder;
   const std::string model = folder.write("string.mdl",
                                          "@s string 40 1. 0.1 0.0005 0. 0.\n"

@@ -1,4 +1,4 @@
-// Standard MIDI Files, byte by byte; times are worked out by hand.
+// Standard MIDI Files, byte by byte, with times computed by hand.
 #include "app/commands/smf/midi_file.h"
 
 #include <cmath>
@@ -58,14 +58,14 @@ bool contains(const std::string& text, const std::string& part) {
 
 }  // namespace
 
-TEST_CASE("running status, a tempo change and long times", "[midi_file]") {
+TEST_CASE("Running status, a tempo change and long times are parsed", "[midi_file]") {
   // 96 ticks a quarter note: 48 ticks are 0.25 s at 120, and 0.5 s at 60 quarter notes a minute.
   const MidiFile midi =
       read(header(0, 1, 96) + track(Bytes{0,    0x93, 60,   100, 48,   60,   0,  // running status
                                           0,    0xff, 0x51, 3,   0x0f, 0x42, 0x40,  // 1 000 000 us
                                           48,   0x93, 62,   1,                      //
                                           0x81, 0x40, 0xc3, 5,                      // 192 ticks
-                                          0,    7} +                                // and once more
+                                          0,    7} +                                // and again
                                     end));
   REQUIRE(midi.messages.size() == 5);
   check(midi, 0, 0.0, {0x93, 60, 100});
@@ -76,10 +76,10 @@ TEST_CASE("running status, a tempo change and long times", "[midi_file]") {
   CHECK(std::fabs(midi.length_s - 2.75) < 1e-12);
 }
 
-TEST_CASE("the tracks of type 1 play together, and one's tempo is that of all", "[midi_file]") {
+TEST_CASE("Tracks of type 1 play together, with the tempo of any track", "[midi_file]") {
   const MidiFile midi =
       read(header(1, 2, 480) +
-           // After a quarter note twice as fast: 250 000 us.
+           // Twice as fast after a quarter note: 250 000 us.
            track(Bytes{0x83, 0x60, 0xff, 0x51, 3, 0x03, 0xd0, 0x90} + end) +
            Bytes{'X', 'F', 'I', 'H', 0, 0, 0, 2, 1, 2} +  // a chunk of another kind
            track(Bytes{0, 0x90, 60, 1, 0x87, 0x40, 0x80, 60, 64, 0x83, 0x60, 0xff, 0x2f, 0}) +
@@ -90,7 +90,7 @@ TEST_CASE("the tracks of type 1 play together, and one's tempo is that of all", 
   CHECK(std::fabs(midi.length_s - 1.0) < 1e-12);
 }
 
-TEST_CASE("frames of SMPTE do not ask for the tempo", "[midi_file]") {
+TEST_CASE("SMPTE times ignore the tempo", "[midi_file]") {
   // 25 frames of 40 ticks are a second; 29 stands for 30 drop frame, 30000 / 1001 a second.
   const Bytes events = track(Bytes{0, 0xff, 0x51, 3, 1, 0, 0, 0x87, 0x68, 0x90, 1, 1} + end);
   check(read(header(0, 1, (256 - 25) << 8 | 40) + events), 0, 1.0, {0x90, 1, 1});
@@ -98,11 +98,11 @@ TEST_CASE("frames of SMPTE do not ask for the tempo", "[midi_file]") {
         {0x90, 1, 1});
 }
 
-TEST_CASE("SysEx is passed on, whole, in parts and as it is", "[midi_file]") {
+TEST_CASE("SysEx is passed on whole, in parts and escaped", "[midi_file]") {
   const MidiFile midi = read(
-      header(0, 1, 96) + track(Bytes{0,  0xf0, 4, 0x7e, 0x7f, 9,    0xf7,       // whole
-                                     0,  0xf0, 2, 0x43, 0x12,                   // begins
-                                     96, 0xf7, 2, 0x01, 0xf7,                   // goes on and ends
+      header(0, 1, 96) + track(Bytes{0,  0xf0, 4, 0x7e, 0x7f, 9,    0xf7,  // whole
+                                     0,  0xf0, 2, 0x43, 0x12,              // begins
+                                     96, 0xf7, 2, 0x01, 0xf7,              // continues and ends
                                      0,  0xf7, 1, 0xf8, 0,    0x80, 1,    2} +  // a clock, escaped
                                end));
   REQUIRE(midi.messages.size() == 5);
@@ -113,7 +113,7 @@ TEST_CASE("SysEx is passed on, whole, in parts and as it is", "[midi_file]") {
   check(midi, 4, 0.5, {0x80, 1, 2});
 }
 
-TEST_CASE("a broken MIDI file is told with its byte", "[midi_file]") {
+TEST_CASE("Errors of a MIDI file have the offset of the byte", "[midi_file]") {
   CHECK(contains(failure({}), "MThd"));
   CHECK(contains(failure({'R', 'I', 'F', 'F', 0, 0, 0, 0}), "byte 0"));
   CHECK(contains(failure({'M', 'T', 'h', 'd', 0, 0}), "byte 6: it ends"));
@@ -123,12 +123,12 @@ TEST_CASE("a broken MIDI file is told with its byte", "[midi_file]") {
   CHECK(contains(failure(header(0, 1, (256 - 25) << 8)), "SMPTE"));
   CHECK(contains(failure(header(0, 1, 96)), "byte 14: it ends before track 1 of 1"));
   const Bytes head = header(0, 1, 96);  // 14 bytes, the track's events begin at 22
-  CHECK(
-      contains(failure(head + Bytes{'M', 'T', 'r', 'k', 0, 0, 0, 9, 0}), "the file ends within a chunk"));
+  CHECK(contains(failure(head + Bytes{'M', 'T', 'r', 'k', 0, 0, 0, 9, 0}),
+                 "the file ends within a chunk"));
   CHECK(contains(failure(head + track({0, 60, 1})), "byte 23: a data byte"));
   CHECK(contains(failure(head + track({0, 0x90, 60, 0x90})), "byte 25: a status"));
-  CHECK(
-      contains(failure(head + track({0, 0x90, 60})), "byte 25: the file ends within a channel message"));
+  CHECK(contains(failure(head + track({0, 0x90, 60})),
+                 "byte 25: the file ends within a channel message"));
   CHECK(contains(failure(head + track({0, 0xf4})), "byte 23: a status that no file"));
   CHECK(contains(failure(head + track({0x81, 0x82, 0x83, 0x84, 0})), "byte 22: the time"));
   CHECK(contains(failure(head + track({0, 0xff, 0x51, 2, 1, 1})), "byte 23: a tempo"));
@@ -140,19 +140,19 @@ TEST_CASE("a broken MIDI file is told with its byte", "[midi_file]") {
                  "longer than a day"));
 }
 
-TEST_CASE("a track may end without saying so", "[midi_file]") {
+TEST_CASE("A track may end without an end-of-track event", "[midi_file]") {
   CHECK(read(header(0, 1, 96) + track({0, 0x90, 60, 1})).messages.size() == 1);
   CHECK(read(header(0, 1, 96) + track({})).messages.empty());
 }
 
-TEST_CASE("a MIDI file is known by its ending in any case", "[midi_file]") {
+TEST_CASE("The extension of a MIDI file may be in any case", "[midi_file]") {
   CHECK(names_midi_file("a/song.mid"));
   CHECK(names_midi_file("SONG.MIDI"));
   CHECK_FALSE(names_midi_file("song.mdl"));
   CHECK_FALSE(names_midi_file("mid"));
 }
 
-TEST_CASE("a rendered song begins at its frame and ends when it is silent", "[midi_file]") {
+TEST_CASE("A rendered MIDI file starts at its frame and ends in silence", "[midi_file]") {
   const Folder folder;
   // A note at 0.5 s, its end a second later, no pedal.
   const Bytes bytes =
@@ -168,11 +168,11 @@ TEST_CASE("a rendered song begins at its frame and ends when it is silent", "[mi
   const std::vector<double>& left = sound->channels[0];
   const auto frame =
       std::find_if(left.begin(), left.end(), [](double y) { return y != 0.0; }) - left.begin();
-  // Struck in frame 24000, the wave needs a frame for each link on its way to the output, and the
-  // limiter is off.
+  // The strike is in frame 24000; the wave takes a frame per link to the output. The limiter is
+  // off.
   CHECK(frame >= 24000);
   CHECK(frame < 24010);
-  // The file lasts 1.5 s; what rings on is gone long before the minute that is waited at most.
+  // The file lasts 1.5 s; the decay ends long before the longest wait of a minute.
   CHECK(static_cast<double>(rendered->frames) >= 1.5 * 48000.0);
   CHECK(static_cast<double>(rendered->frames) < 20.0 * 48000.0);
 }

@@ -1,10 +1,8 @@
-// What is written of what was found in a recording: a model that is read again with the same
-// numbers.
-#include "app/commands/body/recording_text.h"
+// Output of a recording's modes: the model must parse to the same numbers.
+#include "app/commands/body/recording.h"
 
 #include <nlohmann/json.hpp>
 
-#include "app/commands/body/recording_picture.h"
 #include "core/identification/shapes.h"
 #include "tests/support/harness.h"
 #include "tests/support/ringing.h"
@@ -20,7 +18,7 @@ const std::vector<KnownMode> known = {
 
 }  // namespace
 
-TEST_CASE("A label is made of a file's name", "[recording_text]") {
+TEST_CASE("A label is made from a file name", "[recording_text]") {
   CHECK(label_of_file("bowl.mdl") == "bowl");
   CHECK(label_of_file("/a/b.c/My bowl-2.wav") == "My_bowl_2");
   CHECK(label_of_file("2nd.wav") == "body_2nd");
@@ -28,7 +26,7 @@ TEST_CASE("A label is made of a file's name", "[recording_text]") {
   CHECK(label_of_file(".wav") == "_wav");
 }
 
-TEST_CASE("A model of what was found renders the recording", "[recording_text]") {
+TEST_CASE("The model renders the recording", "[recording_text]") {
   Random random(1);
   const std::vector<double> sound = ringing(known, 1.0);
   const auto channels = GENERATE(std::size_t{1}, std::size_t{2}, std::size_t{5});
@@ -55,7 +53,7 @@ TEST_CASE("A model of what was found renders the recording", "[recording_text]")
   CHECK(comparison.relative() < 1e-6);
 }
 
-TEST_CASE("As many digits as are known are written", "[recording_text]") {
+TEST_CASE("Numbers are written with their significant digits", "[recording_text]") {
   Random random(2);
   const Identification found = identified({with_noise(ringing(known, 1.0), 1e-3, random)});
   const std::string text = body_model(found, "b", "x", 40.0);
@@ -66,7 +64,7 @@ TEST_CASE("As many digits as are known are written", "[recording_text]") {
   CHECK(hertz.size() <= 9);
 }
 
-TEST_CASE("The figures for programs are those that were found", "[recording_text]") {
+TEST_CASE("The JSON has the identified modes", "[recording_text]") {
   const Identification found = identified({ringing(known, 1.0)});
   const auto json = nlohmann::json::parse(identification_json(found, 40.0));
   REQUIRE(json["modes"].size() == 3);
@@ -77,7 +75,7 @@ TEST_CASE("The figures for programs are those that were found", "[recording_text
   CHECK(json["residual_db"].get<double>() < -150.0);
 }
 
-TEST_CASE("The picture has a mark and a bar for each mode", "[recording_text]") {
+TEST_CASE("The figure has a mark and a bar for each mode", "[recording_text]") {
   const Identification found = identified({ringing(known, 1.0)});
   const plot::Figure figure = recording_figure(found, "a <b> & c");
   CHECK(figure.title == "a <b> & c: 3 modes");

@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 
 constexpr double pi = std::numbers::pi;
 
-// A folder with solids, gone in the end.
+// A temporary folder with solids.
 class Workshop {
  public:
   Workshop() {
@@ -53,7 +53,7 @@ struct WrittenBody {
   std::vector<WrittenMode> modes;
 };
 
-// The lines as the language has them: "@NAME body M PLACE..." and "@NAME mode @BODY HZ T60 W...".
+// Parsed lines of the model: "@NAME body M PLACE..." and "@NAME mode @BODY HZ T60 W...".
 WrittenBody read_body(const std::string& file) {
   WrittenBody body;
   std::ifstream lines(file);
@@ -84,7 +84,7 @@ bool is_there(const char* program) {
   return std::system(("command -v " + std::string(program) + " >/dev/null 2>&1").c_str()) == 0;
 }
 
-TEST_CASE("a bar becomes a body that moves as a beam", "[solid_body]") {
+TEST_CASE("A bar becomes a body that moves like a beam", "[solid_body]") {
   const Workshop workshop;
   SolidBodyOptions options{
       .input = workshop.put("bar.stl", ascii_stl(box_surface({200, 20, 10}))),
@@ -109,16 +109,16 @@ TEST_CASE("a bar becomes a body that moves as a beam", "[solid_body]") {
   // a = 5, b = 3e-8.
   const double omega = 2.0 * pi * body.modes[0].frequency_hz;
   CHECK(body.modes[0].t60_s == Approx(2.0 * std::log(1000.0) / (5.0 + 3e-8 * omega * omega)));
-  // phi_end^2 m = 4 and phi_mid / phi_end = -0.6079 of a thin beam (T-GAIN); of this one, which is
-  // a twentieth of its length thick, within a few percent.
+  // A thin beam has phi_end^2 m = 4 and phi_mid / phi_end = -0.6079 (T-GAIN). The thickness of this
+  // beam is a twentieth of its length, which changes both by a few percent.
   REQUIRE(body.modes[0].weights.size() == 2);
   CHECK(std::abs(body.modes[0].weights[0]) == Approx(2.0).epsilon(0.03));
   CHECK(body.modes[0].weights[1] / body.modes[0].weights[0] == Approx(-0.6079).epsilon(0.05));
   CHECK(read_text(options.picture, 1 << 24)->find("1: 1286") != std::string::npos);
 }
 
-TEST_CASE("the sound of a struck bar, recorded, has the modes of its solid", "[solid_body]") {
-  // ME-T9: wanted are 0.01 Hz and 0.1 %.
+TEST_CASE("A recording of a struck bar has the modes of its solid", "[solid_body]") {
+  // ME-T9 requires 0.01 Hz and 0.1 %.
   const Workshop workshop;
   SolidBodyOptions options{
       .input = workshop.put("bar.stl", ascii_stl(box_surface({200, 20, 10}))),
@@ -148,7 +148,7 @@ TEST_CASE("the sound of a struck bar, recorded, has the modes of its solid", "[s
   }
 }
 
-TEST_CASE("a ball from an STL swings as Lamb found, by every mesher", "[solid_body]") {
+TEST_CASE("A ball from an STL file has the frequencies of Lamb with every mesher", "[solid_body]") {
   // ME-T3: eta = omega R sqrt(rho / G) at nu = 0.3, multiplicities 5, 5, 3, 7, 7. G = 1 GPa, R =
   // 0.1.
   const Workshop workshop;
@@ -191,7 +191,7 @@ TEST_CASE("a ball from an STL swings as Lamb found, by every mesher", "[solid_bo
   }
 }
 
-TEST_CASE("a bowl and what has a hollow are the same by both programs", "[solid_body]") {
+TEST_CASE("Both meshers agree on a bowl and on a hollow solid", "[solid_body]") {
   if (!is_there("gmsh") || !is_there("tetgen")) {
     WARN("skipped: gmsh or tetgen is not installed");
     return;
@@ -210,7 +210,7 @@ TEST_CASE("a bowl and what has a hollow are the same by both programs", "[solid_
   }
   std::vector<Surface> solids = {hollow};
   if (support::is_thorough()) {
-    solids.push_back(revolved(profile, 48));  // whose mesh takes a quarter of a minute
+    solids.push_back(revolved(profile, 48));  // meshing takes a quarter of a minute
   }
   for (const Surface& solid : solids) {
     std::vector<WrittenBody> bodies;
@@ -226,7 +226,7 @@ TEST_CASE("a bowl and what has a hollow are the same by both programs", "[solid_
       bodies.push_back(read_body(options.output));
     }
     CHECK(bodies[0].m == Approx(bodies[1].m).epsilon(1e-6));
-    // Gmsh cuts across what is round where TetGen keeps the surface.
+    // Gmsh remeshes round surfaces, TetGen keeps them.
     for (std::size_t i = 0; i < 8; ++i) {
       CHECK(bodies[0].modes[i].frequency_hz ==
             Approx(bodies[1].modes[i].frequency_hz).epsilon(1.5e-2));
@@ -234,7 +234,7 @@ TEST_CASE("a bowl and what has a hollow are the same by both programs", "[solid_
   }
 }
 
-TEST_CASE("what is wrong with a solid, and with what is asked of it, ends with 2", "[solid_body]") {
+TEST_CASE("Wrong solids and wrong options end with exit code 2", "[solid_body]") {
   const Workshop workshop;
   Surface open = box_surface({1, 1, 1});
   open.triangles.pop_back();
@@ -270,11 +270,10 @@ TEST_CASE("what is wrong with a solid, and with what is asked of it, ends with 2
     CHECK(solid_body(spoilt) == 2);
   }
   CHECK(solid_body(options) == 0);
-  CHECK(solid_body(options) == 2);  // it is there already
+  CHECK(solid_body(options) == 2);  // the file exists
 }
 
-TEST_CASE("without a mesher it is said what to install, and one that hangs is ended",
-          "[solid_body]") {
+TEST_CASE("A missing mesher gives advice, and a hanging mesher is stopped", "[solid_body]") {
   const auto solid = close_surface(icosphere(1, 1.0, false), Progress());
   REQUIRE(solid);
   auto bent = *solid;
@@ -312,7 +311,7 @@ TEST_CASE("without a mesher it is said what to install, and one that hangs is en
   CHECK(failed.error().message.find("my disk is on fire") != std::string::npos);
 }
 
-TEST_CASE("places and clamps are read as they are written", "[solid_body]") {
+TEST_CASE("Places and clamps are parsed", "[solid_body]") {
   const auto place = parse_place("rim=0.15,0,-1e-3");
   REQUIRE(place);
   CHECK(place->name == "rim");

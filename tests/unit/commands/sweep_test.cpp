@@ -1,4 +1,4 @@
-// A sweep's values, table and picture, held to the closed form of a string.
+// Values, table and figure of a sweep compared with the closed form of a string.
 #include "app/commands/timbre/sweep.h"
 
 #include <cmath>
@@ -27,7 +27,7 @@ std::string text_of(const std::string& path) {
 
 }  // namespace
 
-TEST_CASE("what is swept is read, and goes by ratios where it is wide", "[sweep]") {
+TEST_CASE("Swept parameters are parsed; wide ranges are logarithmic", "[sweep]") {
   const auto wide = parse_swept("M=0.1:30:60");
   REQUIRE(wide);
   CHECK(wide->name == "M");
@@ -52,7 +52,7 @@ TEST_CASE("what is swept is read, and goes by ratios where it is wide", "[sweep]
   CHECK(parse_law("f0_hz=2*M")->formula == "2*M");
 }
 
-TEST_CASE("a sweep's pitch and T60 are those of the string's closed form", "[sweep]") {
+TEST_CASE("Pitch and T60 of a sweep follow the closed form of the string", "[sweep]") {
   const Folder folder;
   const std::string model = folder.file("string.mdl");
   std::ofstream(model) << "@M param 1.\n@Z param 0.02\n@s string 50 M 0.06349 Z 0. 0.\n"
@@ -93,7 +93,7 @@ TEST_CASE("a sweep's pitch and T60 are those of the string's closed form", "[swe
   CHECK(svg.find("</svg>") != std::string::npos);
 }
 
-TEST_CASE("a sweep that cannot be, or is stopped, writes nothing", "[sweep]") {
+TEST_CASE("An invalid or interrupted sweep writes nothing", "[sweep]") {
   const Folder folder;
   const std::string model = folder.file("string.mdl");
   std::ofstream(model) << "@M param 1.\n@s string 12 M 0.1 0.02 0. 0.\n"
