@@ -7,6 +7,7 @@
 #include <variant>
 
 #include "core/compile/instrument.h"
+#include "core/kernels/modal/modal_form.h"
 #include "core/kernels/taps.h"
 #include "core/kernels/waveguides/rails.h"
 
@@ -143,7 +144,7 @@ Picture make_picture(Engine& engine, const Network& network, std::uint32_t numbe
       return known.insert(struck_name(network, program.masses[node])).second;
     }
     return node < program.moving ||
-           (!std::holds_alternative<Modes>(program.form) &&
+           (!program.form.is<Modes>() &&
             std::any_of(program.inputs.begin(), program.inputs.end(), is_hand));
   };
   for (const Program& program : machine.parts) {
@@ -184,7 +185,7 @@ Picture make_picture(Engine& engine, const Network& network, std::uint32_t numbe
       picture.masses.push_back(mass);
       picture.start.push_back(program.position[node]);
     }
-    const auto* const modes = std::get_if<Modes>(&program.form);
+    const auto* const modes = program.form.get_if<Modes>();
     if (modes != nullptr && modes->modes <= room && !modes->is_crossed) {
       take_shapes(program, *modes, chosen.nodes, group);
     }

@@ -52,7 +52,7 @@ class Chooser {
   Part choose(Judge& judge, const Accuracy& spent) {
     spent_ = spent;
     judge_ = &judge;
-    const Accuracy published = sum_of(judge.of(Direct{}), spent_);
+    const Accuracy published = sum_of(judge.of(Form()), spent_);
     if (published.meets(budget_)) {
       budget_.cents = budget_.t60_percent = Budget::unlimited;
       judge_ = nullptr;
@@ -290,7 +290,7 @@ std::optional<Planned> reach(const Machine& machine, const Workload& load, std::
     if (judge) {
       part->accuracy = sum_of(judge->of(program.form), promise.merged);
     }
-    if (const auto* steps = std::get_if<Oversampled>(&program.form)) {
+    if (const auto* steps = program.form.get_if<Oversampled>()) {
       planned.more = std::min(planned.more, static_cast<double>(steps->times * steps->times));
     }
     planned.parts.push_back(*std::move(part));

@@ -19,6 +19,10 @@
 #include "core/kernels/program.h"
 #include "core/progress.h"
 
+namespace ressort::kernels {
+class Executor;
+}
+
 namespace ressort::engine {
 
 enum class Source : std::uint8_t { note, controller, pressure, custom, audio };

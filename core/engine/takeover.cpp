@@ -107,7 +107,8 @@ template <class T>
 bool share_numbers(const Bank<T>& bank, const Bank<T>& from) {
   for (std::size_t i = 0; i < bank.parts.size(); ++i) {
     const Program& to = bank.parts[i].program;
-    if (!to.modes.empty() && is_continuous(to.form) != is_continuous(from.parts[i].program.form)) {
+    if (!to.modes.empty() &&
+        to.form.is_continuous() != from.parts[i].program.form.is_continuous()) {
       return false;
     }
   }

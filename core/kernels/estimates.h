@@ -12,6 +12,8 @@
 
 namespace ressort::kernels {
 
+class Executor;
+
 // What a prediction is for.
 struct Workload {
   bool is_double = true;

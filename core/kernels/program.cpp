@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/kernels/direct/direct_form.h"
 #include "core/sampled_mode.h"
 
 namespace ressort::kernels {
@@ -19,6 +20,8 @@ double value_of(std::span<const Step> formula, std::span<const double> parameter
 }
 
 }  // namespace
+
+Form::Form() : Form(Direct{}) {}
 
 bool is_plain(const Program& program) {
   return std::all_of(program.link_runs.begin(), program.link_runs.end(),
@@ -99,14 +102,9 @@ double sampled_value(const Program& program, const Coefficient& coefficient,
 
 double coefficient_value(const Program& program, const Coefficient& coefficient,
                          std::span<const double> parameters, double stiffness_factor) {
-  return is_continuous(program.form)
+  return program.form.is_continuous()
              ? continuous_value(program, coefficient, parameters, stiffness_factor)
              : sampled_value(program, coefficient, parameters, stiffness_factor);
-}
-
-bool is_continuous(const Form& form) {
-  const auto* modes = std::get_if<Modes>(&form);
-  return modes != nullptr && modes->is_exact;
 }
 
 }  // namespace ressort::kernels

@@ -8,9 +8,10 @@
 #include <vector>
 
 #include "core/formula.h"
-#include "core/kernels/forms.h"
+#include "core/kernels/form.h"
 #include "core/kernels/waveguides/design.h"
 #include "core/laws/law.h"
+#include "core/rooms.h"
 
 namespace ressort::kernels {
 
@@ -190,8 +191,5 @@ double continuous_value(const Program& program, const Coefficient& coefficient,
                         std::span<const double> parameters, double stiffness_factor);
 double sampled_value(const Program& program, const Coefficient& coefficient,
                      std::span<const double> parameters, double stiffness_factor);
-
-// Whether a form's numbers are those of the continuous network.
-bool is_continuous(const Form& form);
 
 }  // namespace ressort::kernels

@@ -26,18 +26,9 @@ namespace {
 using Request = KernelRequest;
 using Use = KernelRow::Use;
 
-template <class Tables, std::size_t i = 0>
-constexpr std::size_t index_of() {
-  if constexpr (std::is_same_v<Tables, std::variant_alternative_t<i, Form>>) {
-    return i;
-  } else {
-    return index_of<Tables, i + 1>();
-  }
-}
-
 template <class T, class Tables, template <class> class K>
 std::unique_ptr<Kernel<T>> make(const Program& program, std::size_t voices, Isa isa) {
-  return std::make_unique<K<T>>(program, std::get<Tables>(program.form), voices, isa);
+  return std::make_unique<K<T>>(program, program.form.get<Tables>(), voices, isa);
 }
 
 template <class Tables>
@@ -50,7 +41,7 @@ template <class Tables>
 constexpr auto work_of() -> Work (*)(const Program&, const Workload&) {
   if constexpr (has_work<Tables>) {
     return [](const Program& program, const Workload& load) {
-      return work(program, std::get<Tables>(program.form), load);
+      return work(program, program.form.get<Tables>(), load);
     };
   } else {
     return nullptr;
@@ -61,37 +52,36 @@ constexpr auto work_of() -> Work (*)(const Program&, const Workload&) {
 template <class Tables, template <class> class K, class Fits>
 constexpr KernelRow row(Method method, std::string_view name, Use use, Fits,
                         double (*least_ns)(const Program&, const Workload&) = nullptr) {
-  return {.form = index_of<Tables>(),
-          .method = method,
-          .name = name,
-          .use = use,
-          .fits = [](const Request& request) -> std::optional<Form> {
-            if (!request.program.waveguides.empty() && !std::is_same_v<Tables, Direct>) {
-              return std::nullopt;  // whose waves no other kernel has
+  return {
+      .kind = Form::kind_of<Tables>(),
+      .method = method,
+      .name = name,
+      .use = use,
+      .fits = [](const Request& request) -> std::optional<Form> {
+        if (!request.program.waveguides.empty() && !std::is_same_v<Tables, Direct>) {
+          return std::nullopt;  // whose waves no other kernel has
+        }
+        std::optional<Tables> tables = Fits()(request);
+        return tables ? std::optional<Form>(std::move(*tables)) : std::nullopt;
+      },
+      .least_ns = least_ns,
+      .work = work_of<Tables>(),
+      .predicted_ns =
+          [](const Program& program, const Workload& load) {
+            if constexpr (has_work<Tables>) {
+              return cost(work(program, program.form.get<Tables>(), load), load);
+            } else {
+              return predicted_ns(program, program.form.get<Tables>(), load);
             }
-            std::optional<Tables> tables = Fits()(request);
-            return tables ? std::optional<Form>(std::move(*tables)) : std::nullopt;
           },
-          .least_ns = least_ns,
-          .work = work_of<Tables>(),
-          .predicted_ns =
-              [](const Program& program, const Workload& load) {
-                if constexpr (has_work<Tables>) {
-                  return cost(work(program, std::get<Tables>(program.form), load), load);
-                } else {
-                  return predicted_ns(program, std::get<Tables>(program.form), load);
-                }
-              },
-          .description =
-              [](const Program& program) {
-                return description(program, std::get<Tables>(program.form));
-              },
-          .voice_bytes =
-              [](const Program& program, std::uint64_t number_bytes) {
-                return voice_bytes(program, std::get<Tables>(program.form), number_bytes);
-              },
-          .make_float = make<float, Tables, K>,
-          .make_double = make<double, Tables, K>};
+      .description =
+          [](const Program& program) { return description(program, program.form.get<Tables>()); },
+      .voice_bytes =
+          [](const Program& program, std::uint64_t number_bytes) {
+            return voice_bytes(program, program.form.get<Tables>(), number_bytes);
+          },
+      .make_float = make<float, Tables, K>,
+      .make_double = make<double, Tables, K>};
 }
 
 constexpr KernelRow rows[] = {
@@ -130,7 +120,7 @@ std::span<const KernelRow> kernel_rows() {
 
 const KernelRow& row_of(const Form& form) {
   return *std::find_if(std::begin(rows), std::end(rows),
-                       [&](const KernelRow& row) { return row.form == form.index(); });
+                       [&](const KernelRow& row) { return row.kind == form.kind(); });
 }
 
 const KernelRow& row_of(Method method) {

@@ -1,7 +1,7 @@
 // core/kernels: all kernels, a row each. Whoever plans, predicts, explains, times or names them
 // reads the rows.
 //
-// A kernel is a folder: the tables that it computes from (its alternative of Form), whether a
+// A kernel is a folder: the tables that it computes from, whether a
 // Program has them and what they cost (*_form), the class that steps them, and its loops (*_step).
 #pragma once
 
@@ -39,8 +39,8 @@ struct KernelRow {
     given,      // comes with several cores, never by its own name
   };
 
-  std::size_t form;  // which alternative of Form
-  Method method;     // of a given one, what it does
+  Form::Kind kind;  // of its tables
+  Method method;    // of a given one, what it does
   std::string_view name;
   Use use;
   // The tables of a Program; nothing where the kernel cannot play it. [any thread but audio]

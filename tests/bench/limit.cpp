@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <chrono>
 
+#include "core/kernels/chains/chains_form.h"
+#include "core/kernels/grid/grid_form.h"
+#include "core/kernels/modal/modal_form.h"
 #include "core/lanes.h"
 
 #ifdef __x86_64__
@@ -67,37 +70,33 @@ double fastest(Isa isa) {
   return best;
 }
 
-struct Arithmetic {
-  // d -= K q + Z d; q += d; and one for each place that is heard. Nothing pushes most of the time.
-  std::optional<double> operator()(const Modes& form) const {
-    if (!form.places.empty()) {
-      return std::nullopt;
-    }
-    return form.modes * (3.0 + static_cast<double>(form.outputs.size()));
-  }
-  // y = K x + Z v; the sum over the offsets; v += w sum; x += v.
-  std::optional<double> operator()(const Grid& form) const {
-    if (form.segments.empty()) {
-      return std::nullopt;
-    }
-    double sum = 0.0;
-    for (const GridSegment& segment : form.segments) {
-      sum += segment.count * (5.0 + static_cast<double>(segment.offsets.size()));
-    }
-    return sum;
-  }
-  std::optional<double> operator()(const Chains& form) const {
-    double sum = 0.0;
-    for (const Chain& chain : form.chains) {
-      sum += chain.count * (chain.is_stiff ? 12.0 : 6.0);
-    }
-    return sum;
-  }
-  template <class Form>
-  std::optional<double> operator()(const Form&) const {
+// d -= K q + Z d; q += d; and one for each place that is heard. Nothing pushes most of the time.
+std::optional<double> multiply_adds_of(const Modes& form) {
+  if (!form.places.empty()) {
     return std::nullopt;
   }
-};
+  return form.modes * (3.0 + static_cast<double>(form.outputs.size()));
+}
+
+// y = K x + Z v; the sum over the offsets; v += w sum; x += v.
+std::optional<double> multiply_adds_of(const Grid& form) {
+  if (form.segments.empty()) {
+    return std::nullopt;
+  }
+  double sum = 0.0;
+  for (const GridSegment& segment : form.segments) {
+    sum += segment.count * (5.0 + static_cast<double>(segment.offsets.size()));
+  }
+  return sum;
+}
+
+std::optional<double> multiply_adds_of(const Chains& form) {
+  double sum = 0.0;
+  for (const Chain& chain : form.chains) {
+    sum += chain.count * (chain.is_stiff ? 12.0 : 6.0);
+  }
+  return sum;
+}
 
 }  // namespace
 
@@ -106,7 +105,14 @@ double multiply_adds_per_ns(Isa isa, bool is_double) {
 }
 
 std::optional<double> multiply_adds(const Program& program) {
-  return std::visit(Arithmetic{}, program.form);
+  if (const auto* const modes = program.form.get_if<Modes>()) {
+    return multiply_adds_of(*modes);
+  }
+  if (const auto* const grid = program.form.get_if<Grid>()) {
+    return multiply_adds_of(*grid);
+  }
+  const auto* const chains = program.form.get_if<Chains>();
+  return chains == nullptr ? std::nullopt : multiply_adds_of(*chains);
 }
 
 }  // namespace ressort::bench

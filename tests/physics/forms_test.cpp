@@ -33,7 +33,7 @@ void add_form(std::vector<std::pair<Method, Form>>& forms, Method method,
 
 std::vector<std::pair<Method, Form>> forms_of(const Program& program) {
   std::vector<std::pair<Method, Form>> forms;
-  forms.emplace_back(Method::direct, Direct{});
+  forms.emplace_back(Method::direct, Form());
   add_form(forms, Method::chains, chains_form(program));
   add_form(forms, Method::modal, modal_form(program));
   add_form(forms, Method::grid, grid_form(program));

@@ -184,7 +184,7 @@ std::vector<double> perform(const Program& program, const Score& score, Isa isa)
 // Plays the direct form in double.
 inline std::vector<double> perform_directly(const Program& program, const Score& score) {
   Program plain = program;
-  plain.form = Direct{};
+  plain.form = Form();
   return perform<double>(plain, score, Isa::base);
 }
 

@@ -7,6 +7,7 @@
 
 #include "core/analysis/assembly.h"
 #include "core/analysis/places.h"
+#include "core/kernels/oversampled/oversampled_form.h"
 #include "core/laws/law.h"
 #include "core/model/language/expression.h"
 
@@ -79,7 +80,7 @@ double bow_steps_per_sample(const Machine& machine) {
     const bool has_bow =
         std::any_of(program.link_runs.begin(), program.link_runs.end(),
                     [](const LinkRun& run) { return is_bow(run.law, run.scheme); });
-    const auto* fine = std::get_if<Oversampled>(&program.form);
+    const auto* fine = program.form.get_if<Oversampled>();
     const double steps = fine != nullptr ? fine->times : 1.0;
     fewest = has_bow ? std::min(fewest, steps) : fewest;
   }

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "core/kernels/modal/modal_form.h"
+#include "core/kernels/oversampled/oversampled_form.h"
 #include "core/kernels/program.h"
 #include "core/linear_algebra/eigen.h"
 
@@ -41,10 +43,10 @@ std::optional<Complex> continuous_pole(double stiffness, double damping) {
 }
 
 Stepping stepping_of(const Form& form) {
-  if (const auto* modes = std::get_if<Modes>(&form)) {
+  if (const auto* modes = form.get_if<Modes>()) {
     return {modes->is_exact ? Stepping::Scheme::exact : Stepping::Scheme::published};
   }
-  if (const auto* oversampled = std::get_if<Oversampled>(&form)) {
+  if (const auto* oversampled = form.get_if<Oversampled>()) {
     Stepping fine = stepping_of(oversampled->fine->form);
     fine.step /= oversampled->times;
     return fine;

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/compile/accuracy/springs.h"
-#include "core/kernels/forms.h"
+#include "core/kernels/form.h"
 
 namespace ressort::compile {
 

@@ -10,6 +10,7 @@
 
 #include "core/engine/mixing/mix.h"
 #include "core/kernels/domains/kernel_task.h"
+#include "core/kernels/domains/sharded_form.h"
 #include "core/kernels/registry.h"
 #include "core/progress.h"
 
@@ -172,7 +173,7 @@ struct Bank : BlockBuffers<T> {
   SharedPart<T> share(std::size_t p, Isa isa, Executor& executor) {
     PartBank<T>& part = parts[p];
     SharedPart<T> together;
-    if (part.kernels.size() < 2 || std::holds_alternative<Shards>(part.program.form)) {
+    if (part.kernels.size() < 2 || part.program.form.template is<kernels::Shards>()) {
       return together;
     }
     typename KernelTask<T>::Make make;

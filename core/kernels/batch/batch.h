@@ -6,6 +6,7 @@
 #include <array>
 #include <vector>
 
+#include "core/kernels/batch/batch_form.h"
 #include "core/kernels/nodes.h"
 #include "core/laws/law.h"
 

@@ -1,4 +1,5 @@
 #include "core/kernels/batch/batch_form.h"
+#include "core/kernels/estimates.h"
 #include "core/laws/law.h"
 
 #include <algorithm>

@@ -1,12 +1,43 @@
 // core/kernels: decides whether a Program is a small body for many voices, and makes its tables.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <optional>
 
-#include "core/kernels/estimates.h"
 #include "core/kernels/program.h"
 
 namespace ressort::kernels {
+
+struct Workload;
+class Work;
+
+// A spring of a Batch, if there is one.
+struct BatchSpring {
+  static constexpr std::uint32_t none = 0xffffffffu;
+  std::uint32_t stiffness = none;  // coefficients
+  std::uint32_t damping = none;
+  std::uint32_t node = none;  // what has no inertia, that an anchor hangs on
+};
+
+// Any other link of a Batch.
+struct BatchLink {
+  std::uint32_t run = 0;  // of Program::link_runs
+  std::uint32_t a = 0;    // nodes
+  std::uint32_t b = 0;
+};
+
+inline constexpr std::uint32_t most_held_masses = 4;
+inline constexpr std::uint32_t most_held_pairs = 6;
+
+// A small body in many voices, several packs of them as one. At most most_held_masses masses stay
+// in registers, with the springs between any two of them and one anchor each; the links that are
+// none of these follow one by one. More masses are stepped in memory, as they are written.
+struct Batch {
+  std::array<BatchSpring, most_held_pairs> pairs;     // masses (0, 1), (0, 2), (1, 2), (0, 3)...
+  std::array<BatchSpring, most_held_masses> anchors;  // [mass]
+  std::vector<BatchLink> links;
+};
 
 // Larger bodies do not fit into the cache together with their voices.
 inline constexpr std::uint32_t most_batch_masses = 16;

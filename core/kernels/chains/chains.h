@@ -9,6 +9,7 @@
 
 #include <utility>
 
+#include "core/kernels/chains/chains_form.h"
 #include "core/kernels/nodes.h"
 
 namespace ressort::kernels {

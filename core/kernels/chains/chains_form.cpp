@@ -4,6 +4,7 @@
 #include <array>
 
 #include "core/kernels/chains/chains.h"
+#include "core/kernels/estimates.h"
 #include "core/kernels/passive/clusters.h"
 #include "core/kernels/taps.h"
 #include "core/laws/law.h"

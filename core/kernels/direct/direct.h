@@ -6,6 +6,7 @@
 // large ones.
 #pragma once
 
+#include "core/kernels/direct/direct_form.h"
 #include "core/kernels/nodes.h"
 #include "core/kernels/waveguides/rails.h"
 

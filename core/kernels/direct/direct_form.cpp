@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/kernels/estimates.h"
+#include "core/kernels/program.h"
 #include "core/kernels/waveguides/rails.h"
 
 namespace ressort::kernels {

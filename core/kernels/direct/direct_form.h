@@ -1,10 +1,17 @@
-// core/kernels: the cost and memory of the direct form, which every Program has.
+// core/kernels: the form that every Program has, and its cost and memory.
 #pragma once
 
-#include "core/kernels/estimates.h"
-#include "core/kernels/program.h"
+#include <cstdint>
+#include <string>
 
 namespace ressort::kernels {
+
+struct Program;
+struct Workload;
+class Work;
+
+// The network as it is written, one voice in each lane. It needs no tables.
+struct Direct {};
 
 Work work(const Program& program, const Direct& form, const Workload& load);
 std::string description(const Program& program, const Direct& form);

@@ -6,6 +6,7 @@
 #pragma once
 
 #include "core/kernels/domains/kernel_task.h"
+#include "core/kernels/domains/sharded_form.h"
 
 namespace ressort::kernels {
 

@@ -7,6 +7,7 @@
 
 #include "core/kernels/domains/executor.h"
 #include "core/kernels/domains/sharded.h"
+#include "core/kernels/estimates.h"
 #include "core/kernels/registry.h"
 
 namespace ressort::kernels {

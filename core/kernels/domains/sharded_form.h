@@ -1,14 +1,26 @@
 // core/kernels: the cost of shards that wait for each other.
 #pragma once
 
+#include <memory>
 #include <span>
 #include <vector>
 
-#include "core/kernels/estimates.h"
 #include "core/kernels/kernel.h"
 #include "core/kernels/program.h"
 
 namespace ressort::kernels {
+
+struct Workload;
+
+// A large network divided into shards (sharded.h), each in a form of its own. An executor steps
+// them on several cores at the same time.
+struct Shard;
+class Executor;
+struct Shards {
+  std::shared_ptr<const std::vector<Shard>> shards;
+  Executor* executor = nullptr;  // outlives the kernels
+  std::uint32_t frames = 1;      // samples that they go on without each other
+};
 
 // The halo is this much deeper than the number of samples: one level for the last sample's forces
 // at outputs, and one because a point's force acts on all nodes around it, of which the shard owns

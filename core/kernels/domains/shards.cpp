@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/kernels/chains/chains_form.h"
+#include "core/kernels/direct/direct_form.h"
 #include "core/kernels/domains/bonds.h"
 #include "core/kernels/domains/halos.h"
 #include "core/kernels/domains/one_by_one.h"
@@ -281,32 +282,23 @@ std::vector<Shard> make_all(const Bonds& bonds, const Division& division, std::u
   return shards;
 }
 
-struct Reformer {
-  Program& program;
-
-  bool operator()(const Direct&) const { return true; }
-  bool operator()(const Chains&) const { return take(chains_form(program)); }
-  bool operator()(const Grid&) const { return take(grid_form(program)); }
-  template <class Other>
-  bool operator()(const Other&) const {
-    return false;
-  }
-
- private:
-  template <class Found>
-  bool take(std::optional<Found> form) const {
-    if (!form) {
-      return false;
+// Gives a shard, which has the direct form, the form that the whole has. Returns false if the shard
+// has no such form, or if kernels of that form cannot be divided.
+bool reform(Program& shard, const Form& whole) {
+  const auto take = [&](auto form) {
+    if (form) {
+      shard.form = *std::move(form);
     }
-    program.form = *std::move(form);
-    return true;
-  }
-};
+    return form.has_value();
+  };
+  return whole.is<Direct>() || (whole.is<Chains>() && take(chains_form(shard))) ||
+         (whole.is<Grid>() && take(grid_form(shard)));
+}
 
 // Converts all shards to the form of the whole; empty if one of them does not fit it.
 std::vector<Shard> reformed(std::vector<Shard> shards, const Form& form) {
   for (Shard& shard : shards) {
-    if (!std::visit(Reformer{shard.program}, form)) {
+    if (!reform(shard.program, form)) {
       return {};
     }
   }
@@ -336,7 +328,7 @@ std::vector<Attempt> attempts_at(const Program& program, const Workload& load, d
     }
   };
   // A short shard of a chain has little overhead: 2n copied masses.
-  if (std::holds_alternative<Chains>(program.form)) {
+  if (program.form.is<Chains>()) {
     add_in(first_cache);
   }
   add_in(second_cache);

@@ -1,6 +1,7 @@
 // core/kernels: a regular network (Grid) whose slots lie side by side in the lanes. One voice.
 #pragma once
 
+#include "core/kernels/grid/grid_form.h"
 #include "core/kernels/nodes.h"
 
 namespace ressort::kernels {

@@ -7,6 +7,7 @@
 #include <tuple>
 #include <utility>
 
+#include "core/kernels/estimates.h"
 #include "core/kernels/grid/grid_places.h"
 #include "core/kernels/passive/clusters.h"
 #include "core/kernels/taps.h"

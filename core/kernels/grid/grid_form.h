@@ -1,13 +1,77 @@
 // core/kernels: decides whether a Program is a regular network, and makes its tables.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <optional>
 
-#include "core/kernels/estimates.h"
 #include "core/kernels/program.h"
 #include "core/progress.h"
 
 namespace ressort::kernels {
+
+struct Workload;
+class Work;
+
+inline constexpr std::uint32_t grid_line = 16;  // slots; as many as the widest pack has lanes
+
+// Slots that are `offsets` away from those they are linked to, all of them.
+struct GridSegment {
+  std::uint32_t first = 0;            // slots, multiples of grid_line
+  std::uint32_t count = 0;            //
+  std::vector<std::int32_t> offsets;  // at most most_grid_offsets
+};
+
+// Links of one run, whose second ends are `offsets` above their first.
+struct GridLinks {
+  std::uint32_t run = 0;     // of Program::link_runs
+  bool is_reversed = false;  // ...or their first above their second
+  std::vector<std::uint32_t> offsets;
+  std::vector<std::vector<std::uint8_t>> is_linked;  // [offset][slot - Grid::first] from there
+};
+
+// Links that fit into nothing, one by one.
+struct GridRest {
+  std::uint32_t run = 0;    // of Program::link_runs
+  std::uint32_t first = 0;  // of Grid::rest_ends
+  std::uint32_t count = 0;
+  bool is_excess = false;  // taken away from what the segments do instead
+};
+
+// A mass outside the grid.
+struct GridLoose {
+  std::uint32_t mass_run = 0;  // of Program::mass_runs
+  std::uint32_t slot = 0;
+};
+
+// A network of rows that are alike, one voice. Every node has a slot; those of the grid lie so that
+// what is linked is at the same few offsets everywhere, with empty slots where rows end. An empty
+// slot is a mass that stays at 0; a ground may lie in several slots, or in none if it is at 0.
+//
+// With one kind of spring everywhere (`segments` is not empty), a mass feels how far y = K x + Z v
+// is from its own at every offset, less what it feels from the `missing` ones. Otherwise the forces
+// of each law in `links` are computed one by one, offset by offset.
+struct Grid {
+  std::uint32_t slots = 0;
+  std::uint32_t first = 0;     // slots [first, first + count) are the grid, multiples of grid_line;
+  std::uint32_t count = 0;     // no offset reaches below 0 or beyond the last slot
+  std::uint32_t mass_run = 0;  // of Program::mass_runs, for all of the grid
+  std::vector<std::uint32_t> slot;    // [node]
+  std::vector<double> position;       // [slot] at the start
+  std::vector<double> velocity;       // [slot]
+  std::vector<std::uint8_t> moves;    // [slot - first] 1 where a mass is, 0 elsewhere
+  std::uint32_t spring_run = 0;       // of Program::link_runs, for the segments
+  std::vector<GridSegment> segments;  // none overlap
+  // [slot - first] how many offsets lead to nobody; fewer, by those that hold it at 0 besides
+  std::vector<std::int8_t> missing;
+  std::vector<GridLinks> links;
+  std::vector<GridRest> rest;
+  std::vector<std::array<std::uint32_t, 2>> rest_ends;  // slots
+  std::vector<std::uint32_t> ports;                     // slots of rest_ends and of force inputs
+  std::vector<GridLoose> loose;
+};
+
+inline constexpr std::size_t most_grid_offsets = 8;
 
 inline constexpr std::uint32_t least_grid_masses = 16;
 

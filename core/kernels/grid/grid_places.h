@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/kernels/grid/grid_form.h"
 #include "core/kernels/grid/grid_rows.h"
 
 namespace ressort::kernels {

@@ -10,6 +10,7 @@
 #pragma once
 
 #include "core/kernels/kernel.h"
+#include "core/kernels/modal/modal_form.h"
 #include "core/kernels/passive/room.h"
 
 namespace ressort::kernels {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/kernels/modal/modal_form.h"
 #include "core/kernels/program.h"
 #include "core/linear_algebra/matrix.h"
 #include "core/progress.h"

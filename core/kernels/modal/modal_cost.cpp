@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "core/kernels/estimates.h"
 #include "core/kernels/modal/modal_form.h"
 #include "core/lanes.h"
 #include "core/laws/law.h"

@@ -8,6 +8,7 @@
 // by it.
 #pragma once
 
+#include "core/kernels/modal/modal_form.h"
 #include "core/kernels/modal/modal_sweep.h"
 #include "core/sampled_mode.h"
 

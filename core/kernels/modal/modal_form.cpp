@@ -6,6 +6,7 @@
 #include <map>
 #include <utility>
 
+#include "core/kernels/estimates.h"
 #include "core/kernels/modal/modal_body.h"
 #include "core/kernels/modal/modal_crossed.h"
 #include "core/kernels/modal/modal_worth.h"

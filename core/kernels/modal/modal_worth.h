@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/kernels/modal/modal_form.h"
 #include "core/rooms.h"
 
 namespace ressort::kernels {

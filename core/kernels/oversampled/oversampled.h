@@ -4,6 +4,7 @@
 #pragma once
 
 #include "core/kernels/kernel.h"
+#include "core/kernels/oversampled/oversampled_form.h"
 
 namespace ressort::kernels {
 

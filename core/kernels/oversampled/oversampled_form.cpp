@@ -2,13 +2,14 @@
 
 #include <utility>
 
+#include "core/kernels/estimates.h"
 #include "core/kernels/registry.h"
 
 namespace ressort::kernels {
 
 Program oversampled_program(const Program& program, std::uint32_t times) {
   Program fine = program;
-  fine.form = Direct{};
+  fine.form = Form();
   fine.rate_hz *= times;
   fine.rate_ratio /= times;
   for (double& velocity : fine.velocity) {

@@ -43,7 +43,7 @@ std::complex<double> pole_of(const std::vector<double>& x, std::size_t stride) {
 }
 
 std::vector<double> struck(const std::string& text, double rate_hz, std::size_t frames,
-                           const Form& form = Direct{}) {
+                           const Form& form = Form()) {
   Program program = make_program(network_of(text), rate_hz, true);
   program.form = form;
   Bare<double> bare(program);

@@ -130,7 +130,7 @@ struct Contest {
 template <class T>
 std::vector<Comparison> contest(const Program& program, const Contest& options) {
   Program plain = program;
-  plain.form = Direct{};
+  plain.form = Form();
   Choir<double> reference(plain, options.voices, Isa::base);
   Choir<T> found(program, options.voices, options.isa);
   const auto hands = [&](std::size_t n, std::size_t voice, std::size_t input) {
@@ -221,7 +221,7 @@ std::string random_body(std::uint64_t seed, std::size_t masses) {
 
 TEST_CASE("a triangle is held whole, its pick is walked", "[batch]") {
   const Program program = formed(example("IPlayTheTriangle"));
-  const auto& batch = std::get<Batch>(program.form);
+  const auto& batch = program.form.get<Batch>();
   const auto is_held = [](const BatchSpring& spring) { return spring.stiffness != none; };
   CHECK(std::count_if(batch.pairs.begin(), batch.pairs.begin() + 3, is_held) == 3);
   CHECK(std::count_if(batch.pairs.begin() + 3, batch.pairs.end(), is_held) == 0);

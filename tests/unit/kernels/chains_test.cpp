@@ -48,7 +48,7 @@ void check_both(const Program& program, const ComparisonOptions& options,
 // loud ones; in the direct form as well.
 void check_float(const Program& program, ComparisonOptions options) {
   Program plain = program;
-  plain.form = Direct{};
+  plain.form = Form();
   const std::vector<Comparison> direct = support::compare_kernels<float>(plain, options);
   for (const Isa isa : isas()) {
     options.isa = isa;
@@ -125,7 +125,7 @@ TEST_CASE("strings are found in any order of their lines", "[chains]") {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     CAPTURE(seed);
     const Program program = formed(shuffled(scenes::plucked_harmonics(), seed));
-    const auto& form = std::get<Chains>(program.form);
+    const auto& form = program.form.get<Chains>();
     REQUIRE(form.chains.size() == 1);
     const Chain& chain = form.chains[0];
     CHECK(chain.count == 150);
@@ -212,7 +212,7 @@ TEST_CASE("stiff strings are found in any order of their lines", "[chains]") {
         formed(shuffled(stiff_string("a", 60) + "@in1 frcInput @a_m7\n@out1 posOutput @a_m50\n" +
                             "@out2 posOutput @a_m59\n",
                         seed));
-    const auto& form = std::get<Chains>(program.form);
+    const auto& form = program.form.get<Chains>();
     REQUIRE(form.chains.size() == 1);
     CHECK(form.chains[0].count == 60);
     CHECK(form.chains[0].is_stiff);
@@ -227,9 +227,9 @@ TEST_CASE("stiff strings are found in any order of their lines", "[chains]") {
       "@k param 0.4\n@k2 param 0.1\n@s stiffString 152 1. k k2 0.01 0. 0.\n@in1 frcInput [@s 0.3]\n"
       "@out1 posOutput [@s 0.81]\n";
   const Program program = formed(macro);
-  CHECK(std::get<Chains>(program.form).chains.at(0).is_stiff);
-  CHECK(std::get<Chains>(program.form).chains.at(0).count == 150);
-  CHECK(std::get<Chains>(program.form).links.size() <= 1);  // that of a ground to itself
+  CHECK(program.form.get<Chains>().chains.at(0).is_stiff);
+  CHECK(program.form.get<Chains>().chains.at(0).count == 150);
+  CHECK(program.form.get<Chains>().links.size() <= 1);  // that of a ground to itself
   check_both(program, {.turns = true});
 }
 
@@ -279,8 +279,8 @@ TEST_CASE("stiff strings of every length and every end fold into every pack", "[
       text += "@out3 frcOutput @a_m1\n@out4 frcOutput " + scenes::at("a_m", count - 2) +
               "\n@out5 frcOutput @g\n@out6 frcOutput @in2\n";
       const Program program = formed(text);
-      CHECK(std::get<Chains>(program.form).chains.at(0).is_stiff);
-      CHECK(std::get<Chains>(program.form).links.empty());
+      CHECK(program.form.get<Chains>().chains.at(0).is_stiff);
+      CHECK(program.form.get<Chains>().links.empty());
       check_same<double>(program, {.frames = 300, .reach = 0.1}, 1e-12, 200.0);
     }
   }
@@ -305,8 +305,8 @@ TEST_CASE("everything beside a string acts on it", "[chains]") {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     CAPTURE(seed);
     const Program program = formed(shuffled(text, seed));
-    CHECK(std::get<Chains>(program.form).chains.size() == 2);
-    CHECK(std::get<Chains>(program.form).loose.size() == 3);
+    CHECK(program.form.get<Chains>().chains.size() == 2);
+    CHECK(program.form.get<Chains>().loose.size() == 3);
     const ComparisonOptions options{
         .frames = 15000, .seed = seed, .reach = 0.05, .turns = seed > 1, .pitch = 0.9};
     check_same<double>(program, options, 1e-12, 200.0);

@@ -25,7 +25,7 @@ Program formed(const std::string& text) {
 }
 
 const Grid& grid_of(const Program& program) {
-  return std::get<Grid>(program.form);
+  return program.form.get<Grid>();
 }
 
 // The text's lines with what they declare, in another order; ends exchanged here and there.

@@ -2,6 +2,7 @@
 #include "app/realtime/denormals.h"
 #include "app/realtime/thread_pool.h"
 #include "core/kernels/chains/chains_form.h"
+#include "core/kernels/direct/direct_form.h"
 #include "core/kernels/domains/shards.h"
 #include "core/kernels/grid/grid_form.h"
 #include "core/laws/laws.h"
@@ -279,7 +280,9 @@ TEST_CASE("a wave goes over the cut as if it were not there", "[halo]") {
   // With copies of what is near enough for 16 samples only, 64 are too many.
   Program narrow = sharded(program, {2, 16}, executor, as_it_is);
   CHECK(played(narrow) == heard);
-  std::get<Shards>(narrow.form).frames = 64;
+  Shards wider = narrow.form.get<Shards>();
+  wider.frames = 64;
+  narrow.form = std::move(wider);
   CHECK(played(narrow) != heard);
 }
 
@@ -314,7 +317,7 @@ TEST_CASE("a network is shared out where that pays", "[halo]") {
     const auto [machine, parts, more] = make_plan(make_machine(network_of(text), 44100.0, true),
                                                   {.isa = Isa::v3, .executor = helpers}, method);
     INFO(describe(parts));
-    const auto* const shards = std::get_if<Shards>(&machine.parts[0].form);
+    const auto* const shards = machine.parts[0].form.get_if<Shards>();
     if (shards != nullptr) {
       const std::string count = std::to_string(shards->shards->size());
       CHECK(describe(parts).find(" " + count + " shards") != std::string::npos);
@@ -346,12 +349,12 @@ TEST_CASE("one core steps a network in shards where its caches do not hold it", 
   const Machine machine = make_machine(network_of(text), 44100.0, true);
   const Planned planned = make_plan(machine, {.isa = best_isa()}, Method::chains);
   const Program& cut = planned.machine.parts[0];
-  const auto* const shards = std::get_if<Shards>(&cut.form);
+  const auto* const shards = cut.form.get_if<Shards>();
   REQUIRE(shards != nullptr);
   CHECK(shards->shards->size() == 196);  // of 32 bytes a mass, in shards of at most 48 KiB
   CHECK(describe(planned.parts).find("196 shards one after the other") != std::string::npos);
   const Planned grid = make_plan(machine, {.isa = best_isa()}, Method::grid);
-  const auto* const wide = std::get_if<Shards>(&grid.machine.parts[0].form);
+  const auto* const wide = grid.machine.parts[0].form.get_if<Shards>();
   REQUIRE(wide != nullptr);
   CHECK(wide->shards->size() == 10);  // of at most 1 MiB
   Program whole = machine.parts[0];

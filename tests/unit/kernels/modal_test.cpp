@@ -21,7 +21,7 @@ Program modal_program(const std::string& text, double rate_hz = 44100.0) {
   return program;
 }
 const Modes& modes_of(const Program& program) {
-  return std::get<Modes>(program.form);
+  return program.form.get<Modes>();
 }
 bool has_modes(const std::string& text) {
   return modal_form(support::program_of(text)).has_value();

@@ -32,7 +32,9 @@ Program in_modes(const std::string& text, double silence_db) {
 
 // All awake; of those that a budget leaves in, or of all that there are.
 Program wide_awake(Program program) {
-  std::get<Modes>(program.form).silence = 0.0;
+  Modes modes = program.form.get<Modes>();
+  modes.silence = 0.0;
+  program.form = std::move(modes);
   return program;
 }
 
@@ -90,7 +92,7 @@ class Pair {
   double excess() const { return excess_; }    // of the error over the bound
   double reduced() const { return reduced_; }  // the same beside all modes that there are
   const Program& program() const { return program_; }
-  const Modes& form() const { return std::get<Modes>(program_.form); }
+  const Modes& form() const { return program_.form.get<Modes>(); }
 
  private:
   const ModalKernel<T>& kernel() const {
@@ -113,7 +115,7 @@ class Pair {
 
 // How far all modes together may swing an output after a blow of 1, at most.
 double reach_of_a_blow(const std::string& text) {
-  const Modes modes = std::get<Modes>(in_modes(text, -Budget::unlimited).form);
+  const Modes modes = in_modes(text, -Budget::unlimited).form.get<Modes>();
   double most = 0.0;
   for (const ModalOutput& output : modes.outputs) {
     double sum = 0.0;

@@ -38,7 +38,7 @@ TEST_CASE("The triangle's poles are those that are known", "[modes_crossed]") {
   };
   const auto check = [](const Budget& budget, const std::vector<Pole>& known) {
     const Program program = in_crossed_modes(triangle(), Passivity::never, budget);
-    const Modes& modes = std::get<Modes>(program.form);
+    const Modes& modes = program.form.get<Modes>();
     REQUIRE(modes.modes == known.size());
     for (const auto& [hz, t60_s] : known) {
       double nearest_hz = 1e9;
@@ -120,7 +120,7 @@ TEST_CASE("Crossed modes of random bodies sound as mass by mass", "[modes_crosse
 TEST_CASE("A start from anywhere and from rest", "[modes_crossed]") {
   const Program program = in_crossed_modes(random_body(4, 12));
   Program plain = program;
-  plain.form = Direct{};
+  plain.form = Form();
   support::Bare<double> one(program);
   support::Bare<double> other(plain);
   Random random(9);
@@ -250,7 +250,7 @@ TEST_CASE("Exact crossed modes are the matrix exponential of the network", "[mod
     }
     chain.damping[0] = 0.02;
     const Program program = in_crossed_modes(chain.text(), Passivity::never, physical);
-    REQUIRE(std::get<Modes>(program.form).is_exact);
+    REQUIRE(program.form.get<Modes>().is_exact);
     support::Bare<double> bare(program);
     const Square step = exponential_of(chain.flow());
     std::vector<double> state(2 * n + 1, 0.0);

@@ -247,7 +247,7 @@ TEST_CASE("The plan takes exact modes where the published scheme is too far off"
                                        "@in1 frcInput @s_m4\n" + scenes::output(1, "s_m9"));
     const auto [machine, parts, more] =
         make_plan(make_machine(network, 44100.0, true), {}, {}, patient_modes, budget);
-    const Modes* const modes = std::get_if<Modes>(&machine.parts[0].form);
+    const Modes* const modes = machine.parts[0].form.get_if<Modes>();
     INFO(describe(parts));
     return std::pair{modes != nullptr && modes->is_exact, describe(parts)};
   };
@@ -262,7 +262,7 @@ TEST_CASE("How far off the published scheme is", "[modes_exact]") {
   const auto of = [](const std::string& stiffness, const std::string& damping) {
     const Program program = support::program_of(scenes::string("s", 50, stiffness, damping) +
                                                 scenes::output(1, "s_m9"));
-    return Judge(program, {{program.parameters, 1.0}}, patient_modes).of(Direct{});
+    return Judge(program, {{program.parameters, 1.0}}, patient_modes).of(Form());
   };
   // The highest mode of such a string is 31.7 cents and 0.2 % off: its K is 0.4 cos^2(pi/102), and
   // 2 asin(sqrt(K)/2) beside sqrt(K - Z^2/4).

@@ -211,7 +211,7 @@ std::string string_over_a_wall(double stiffness) {
 
 // The first `count` in pitch, with or without what the others would give way.
 Program shortened(const Program& program, std::uint32_t count, bool gives) {
-  const Modes full = std::get<Modes>(program.form);
+  const Modes full = program.form.get<Modes>();
   const std::vector<double>& factor = full.stiffness[0].factor;
   std::vector<std::uint32_t> order(full.modes);
   for (std::uint32_t i = 0; i < full.modes; ++i) {
@@ -265,7 +265,7 @@ std::vector<double> heard_of(const Program& program, std::size_t frames) {
 TEST_CASE("A contact feels the modes that are left out give way", "[modes_left_out]") {
   Program full = make_program(network_of(string_over_a_wall(2.0)), 44100.0, true);
   full.form = *modal_form(full);
-  REQUIRE(std::get<Modes>(full.form).modes == 50);
+  REQUIRE(full.form.get<Modes>().modes == 50);
   const auto wanted = heard_of(full, 220);
   const auto snr = [&](std::uint32_t count, bool gives) {
     const auto found = heard_of(shortened(full, count, gives), 220);

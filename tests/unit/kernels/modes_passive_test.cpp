@@ -145,7 +145,7 @@ TEST_CASE("Hard contacts on modes make no energy in a million samples", "[modes_
   const auto samples = support::of_all<std::size_t>(200'000, 1'000'000);
   for (const Budget& budget : {Budget{}, Budget{.cents = 1e-6}}) {
     const Program program = in_modes(Lossless().text(), Passivity::always, budget);
-    const bool is_exact = std::get<Modes>(program.form).is_exact;
+    const bool is_exact = program.form.get<Modes>().is_exact;
     Fighter<double> fighter(program, 1.0, best_isa());
     const std::vector<std::vector<double>> nobody(64);
     std::vector<double> last;
@@ -188,7 +188,9 @@ TEST_CASE("Modes sleep while no passive link touches, and wake as one does", "[m
                            scenes::output(1, "m_m3_3") + scenes::output(2, "m_m7_1");
   const Program sleepy = in_modes(text, Passivity::always, {.silence_db = -60.0});
   Program awake = sleepy;
-  std::get<Modes>(awake.form).silence = 0.0;
+  Modes all_awake = awake.form.get<Modes>();
+  all_awake.silence = 0.0;
+  awake.form = std::move(all_awake);
   Fighter<double> one(sleepy, 1.0, best_isa());
   Fighter<double> other(awake, 1.0, best_isa());
   double worst = 0.0;
@@ -269,13 +271,14 @@ TEST_CASE("Modes that are left out give way to passive links as well", "[modes_p
   text += "@c contact @m17 @in1 5. 0.01 0.\n" + scenes::output(1, "m17");
   const auto pressed = [&](double silence_db, bool gives) {
     Program program = in_modes(text, Passivity::always, {.silence_db = silence_db});
-    auto& modes = std::get<Modes>(program.form);
+    Modes modes = program.form.get<Modes>();
     modes.silence = 0.0;
     for (ModalHold& hold : modes.holds) {
       for (double& give : hold.give) {
         give = gives ? give : 0.0;
       }
     }
+    program.form = modes;
     const auto rest = [&](double finger, double force) {
       Fighter<double> fighter(program, 1.0, best_isa());
       std::vector<double> heard;

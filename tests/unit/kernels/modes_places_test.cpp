@@ -26,9 +26,9 @@ TEST_CASE("A string driven and heard at places has its modes", "[modes_places]")
 TEST_CASE("A place's modes are sums of those of the masses around it", "[modes_places]") {
   // 0.3 of 19 lengths is 0.7 of the way from mass 5 to mass 6.
   const std::string string = "@s string 20 1. 0.3 0.002 0. 0.\n@in1 frcInput [@s 0.]\n";
-  const Modes at = std::get<Modes>(in_modes(string + "@out1 posOutput [@s 0.3]\n").form);
+  const Modes at = in_modes(string + "@out1 posOutput [@s 0.3]\n").form.get<Modes>();
   const Program ends = in_modes(string + "@out1 posOutput [@s 5/19]\n@out2 posOutput [@s 6/19]\n");
-  const Modes& around = std::get<Modes>(ends.form);
+  const Modes& around = ends.form.get<Modes>();
   REQUIRE(at.modes == around.modes);
   for (std::size_t i = 0; i < at.modes; ++i) {
     const double wanted =

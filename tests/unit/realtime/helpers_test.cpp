@@ -408,7 +408,7 @@ TEST_CASE("helpers play the shards of a large network with the same bits", "[hel
       helpers.erase(thread);
     }
     const auto engine = made(&pool);
-    CHECK(std::holds_alternative<Shards>(engine->machine().parts[0].form));
+    CHECK(engine->machine().parts[0].form.is<Shards>());
     const Stalls stalls(helpers, 500);
     CHECK(played(*engine, clock, 3000, 0) == expected);
   }
