@@ -79,80 +79,82 @@ class Furnisher {
     const std::size_t places = modes_.places.size();
     const std::size_t ends = places + modes_.ends.size();
     const std::size_t observed = places + modes_.outputs.size();
-    state.modes = padded_;
-    state.stride = stride_;
-    state.row = row_;
-    for (T** row : {&state.q, &state.d, &state.k, &state.z, &state.saved_q, &state.saved_d,
-                    &state.spread, &state.decay, &state.swing, &state.debt}) {
+    state.shapes.modes = padded_;
+    state.shapes.stride = stride_;
+    state.shapes.row = row_;
+    for (T** row : {&state.motion.q, &state.motion.d, &state.motion.k, &state.motion.z,
+                    &state.saved.q, &state.saved.d, &state.sleep.spread, &state.sleep.decay,
+                    &state.sleep.amplitude, &state.sleep.debt}) {
       *row = arena_.take(stride_);
     }
-    state.load = arena_.take(row_);
-    state.held_give = arena_.take(link_count(modes_));
-    state.loudness = arena_.take(observed);
-    state.room = arena_.take(observed);
-    state.stiffness = factors(modes_.stiffness);
-    state.damping = factors(modes_.damping);
-    state.pushes = rows(
+    state.sweep.load = arena_.take(row_);
+    state.held.give = arena_.take(link_count(modes_));
+    state.sleep.loudness = arena_.take(observed);
+    state.sleep.room = arena_.take(observed);
+    state.shapes.stiffness = factors(modes_.stiffness);
+    state.shapes.damping = factors(modes_.damping);
+    state.shapes.pushes = rows(
         modes_.pushes, [](auto& push) -> auto& { return push.shape; });
-    state.places = rows(
+    state.shapes.places = rows(
         modes_.places, [](auto& place) -> auto& { return place.shape; });
-    state.outputs = rows(
+    state.shapes.outputs = rows(
         modes_.outputs, [](auto& output) -> auto& { return output.place.shape; });
     if (modes_.is_exact && !modes_.is_crossed) {
-      for (T** row : {&state.root, &state.k_step, &state.z_step}) {
+      for (T** row : {&state.motion.root, &state.motion.k_step, &state.motion.z_step}) {
         *row = arena_.take(stride_);
       }
       const std::size_t count = shape_count() * stride_;
       T* const shape = arena_.take(count);
       if (shape != nullptr) {
-        std::copy_n(state.pushes, count, shape);
+        std::copy_n(state.shapes.pushes, count, shape);
       }
-      state.shape = shape;
+      state.shapes.unscaled = shape;
     }
     if (modes_.is_crossed) {
-      state.speeds = rows(
+      state.shapes.speeds = rows(
           modes_.places, [](auto& place) -> auto& { return place.speed; });
-      state.pole = rows(
+      state.shapes.pole = rows(
           std::array{&modes_.pole}, [](auto& pole) -> auto& { return *pole; });
     }
-    state.push_norm = norms(
+    state.shapes.push_norm = norms(
         modes_.pushes, [](auto& push) -> auto& { return push.shape; });
-    state.place_norm = norms(
+    state.shapes.place_norm = norms(
         modes_.places, [](auto& place) -> auto& { return place.shape; });
-    state.used = arena_.take(modes_.stiffness.size() + modes_.damping.size() + 1);
-    state.late = arena_.take(modes_.pushes.size());
-    state.amplitude = arena_.take(max_block_frames * modes_.pushes.size());
-    state.compliance = arena_.take(places);
-    state.x = arena_.take(ends);
-    state.v = arena_.take(ends);
-    state.force = arena_.take(ends);
-    state.saved_force = arena_.take(places);
-    state.kicked = arena_.take(places);
-    state.kick = arena_.take(most_rows + places + modes_.pushes.size());
-    state.speed = arena_.take(most_rows + places + modes_.pushes.size());
-    state.heard = arena_.take(most_rows + modes_.outputs.size());
-    state.bundle = arena_.take(most_rows * row_);
-    state.seen = arena_.take(max_block_frames * observed);
-    state.forces = static_cast<std::size_t>(
+    state.motion.used = arena_.take(modes_.stiffness.size() + modes_.damping.size() + 1);
+    state.inputs.late = arena_.take(modes_.pushes.size());
+    state.inputs.amplitude = arena_.take(max_block_frames * modes_.pushes.size());
+    state.ends.compliance = arena_.take(places);
+    state.ends.x = arena_.take(ends);
+    state.ends.v = arena_.take(ends);
+    state.ends.force = arena_.take(ends);
+    state.saved.force = arena_.take(places);
+    state.ends.kicked = arena_.take(places);
+    state.sweep.kick = arena_.take(most_rows + places + modes_.pushes.size());
+    state.sweep.speed = arena_.take(most_rows + places + modes_.pushes.size());
+    state.sweep.heard = arena_.take(most_rows + modes_.outputs.size());
+    state.sweep.bundle = arena_.take(most_rows * row_);
+    state.sweep.seen = arena_.take(max_block_frames * observed);
+    state.forces.count = static_cast<std::size_t>(
         std::count_if(modes_.outputs.begin(), modes_.outputs.end(),
                       [](const ModalOutput& output) { return output.is_force; }));
-    state.felt = arena_.take(2 * state.forces * stride_);
-    state.felt_still = arena_.take(state.forces);
-    state.exerted = arena_.take(ends);
-    state.saved_x = arena_.take(ends);
-    state.saved_v = arena_.take(ends);
-    state.shove = arena_.take(places);
-    state.passives = passives_;
-    state.reply = arena_.take(observed * passives_);
-    state.gamma = arena_.take(passives_ * passives_);
-    state.straight = arena_.take((2 * most_straight + 1) * most_straight);
-    state.memory = arena_.take(passive_rows * passives_);
+    state.forces.rows = arena_.take(2 * state.forces.count * stride_);
+    state.forces.still = arena_.take(state.forces.count);
+    state.ends.exerted = arena_.take(ends);
+    state.saved.x = arena_.take(ends);
+    state.saved.v = arena_.take(ends);
+    state.passive.shove = arena_.take(places);
+    state.passive.count = passives_;
+    state.passive.reply = arena_.take(observed * passives_);
+    state.passive.gamma = arena_.take(passives_ * passives_);
+    state.passive.straight = arena_.take((2 * most_straight + 1) * most_straight);
+    state.passive.memory = arena_.take(passive_rows * passives_);
     const Cluster all{.count = static_cast<std::uint32_t>(passives_)};
-    state.numbers = arena_.take(all.numbers());
-    state.pushed = arena_.take(passives_);
-    state.give = gives();
-    for (T** row : {&state.opening, &state.rush, &state.slack, &state.yield, &state.yield_step,
-                    &state.saved_yield, &state.saved_yield_step}) {
+    state.passive.numbers = arena_.take(all.numbers());
+    state.passive.pushed = arena_.take(passives_);
+    state.passive.give = gives();
+    for (T** row :
+         {&state.passive.opening, &state.passive.rush, &state.passive.slack, &state.passive.yield,
+          &state.passive.yield_step, &state.saved.yield, &state.saved.yield_step}) {
       *row = arena_.take(passives_);
     }
     return arena_.used();
@@ -244,17 +246,17 @@ ModalKernel<T>::ModalKernel(const Program& program, const Modes& modes, std::siz
   active_.clusters.resize(1);
   numbers_.resize(Furnisher<T>(program, modes, passives, isa, nullptr).furnish(state_));
   Furnisher<T>(program, modes, passives, isa, numbers_.data()).furnish(state_);
-  state_.passive = passive_.data();
-  state_.active = &active_;
-  state_.rows = rows_.data();
-  state_.bundled_rows = bundled_rows_.data();
-  state_.push_of = indices_.data();
-  state_.row_of = state_.push_of + modes.pushes.size();
-  state_.place_of = state_.row_of + modes.places.size();
-  state_.held = state_.place_of + modes.places.size();
-  state_.held_ends = held_ends_.data();
-  state_.silence = static_cast<T>(modes.silence);
-  state_.lately_kept =
+  state_.passive.links = passive_.data();
+  state_.passive.active = &active_;
+  state_.sweep.rows = rows_.data();
+  state_.sweep.bundled_rows = bundled_rows_.data();
+  state_.inputs.push_of = indices_.data();
+  state_.held.row_of = state_.inputs.push_of + modes.pushes.size();
+  state_.held.place_of = state_.held.row_of + modes.places.size();
+  state_.held.count_of = state_.held.place_of + modes.places.size();
+  state_.held.ends = held_ends_.data();
+  state_.sleep.silence = static_cast<T>(modes.silence);
+  state_.sleep.lately_kept =
       static_cast<T>(std::pow(1e-3, static_cast<double>(check_frames) / program.rate_hz));
   this->reset(0);
 }
@@ -275,12 +277,12 @@ void ModalKernel<T>::set_state(std::size_t, const double* x, const double* v) {
       q += basis[0] * moved + (modes_.is_crossed ? basis[2 * block] * faster : 0.0);
       d += modes_.is_crossed ? basis[block] * moved + basis[3 * block] * faster : basis[0] * faster;
     }
-    state_.q[i] = static_cast<T>(q);
-    state_.d[i] = static_cast<T>(d);
+    state_.motion.q[i] = static_cast<T>(q);
+    state_.motion.d[i] = static_cast<T>(d);
   }
   for (std::size_t i = 0; i < modes_.ends.size(); ++i) {
-    state_.x[places + i] = static_cast<T>(x[modes_.ends[i].node]);
-    state_.v[places + i] = static_cast<T>(v[modes_.ends[i].node]);
+    state_.ends.x[places + i] = static_cast<T>(x[modes_.ends[i].node]);
+    state_.ends.v[places + i] = static_cast<T>(v[modes_.ends[i].node]);
   }
   for (std::size_t p = 0; modes_.is_crossed && p < places; ++p) {
     double position = modes_.places[p].offset;
@@ -289,29 +291,29 @@ void ModalKernel<T>::set_state(std::size_t, const double* x, const double* v) {
       position += mass.weight * x[mass.node];
       velocity += mass.weight * v[mass.node];
     }
-    state_.x[p] = static_cast<T>(position);
-    state_.v[p] = static_cast<T>(velocity);
+    state_.ends.x[p] = static_cast<T>(position);
+    state_.ends.v[p] = static_cast<T>(velocity);
   }
   // No link has computed anything yet: in the first sample there is nothing to feel.
-  std::fill_n(state_.used, modes_.stiffness.size() + modes_.damping.size() + 1, T(0));
-  std::fill_n(state_.late, modes_.pushes.size(), T(0));
-  std::fill_n(state_.force, places + modes_.ends.size(), T(0));
-  std::fill_n(state_.pushed, passive_.size(), T(0));
-  std::fill_n(state_.yield, passive_.size(), T(0));
-  std::fill_n(state_.yield_step, passive_.size(), T(0));
-  state_.pulls = false;
-  state_.is_pushed = false;
-  state_.touched_frames = 0;
-  state_.surprised_frames = 0;
-  state_.kick_norm = T(0);
-  if (state_.root != nullptr) {
-    std::fill_n(state_.root, state_.modes, T(1));
+  std::fill_n(state_.motion.used, modes_.stiffness.size() + modes_.damping.size() + 1, T(0));
+  std::fill_n(state_.inputs.late, modes_.pushes.size(), T(0));
+  std::fill_n(state_.ends.force, places + modes_.ends.size(), T(0));
+  std::fill_n(state_.passive.pushed, passive_.size(), T(0));
+  std::fill_n(state_.passive.yield, passive_.size(), T(0));
+  std::fill_n(state_.passive.yield_step, passive_.size(), T(0));
+  state_.passive.pulls = false;
+  state_.passive.is_pushed = false;
+  state_.held.touched_frames = 0;
+  state_.held.surprised_frames = 0;
+  state_.ends.kick_norm = T(0);
+  if (state_.motion.root != nullptr) {
+    std::fill_n(state_.motion.root, state_.shapes.modes, T(1));
   }
-  state_.is_stale = true;
-  state_.fresh_frames = 0;
+  state_.motion.is_stale = true;
+  state_.motion.fresh_frames = 0;
   wake_all();
-  std::fill_n(state_.debt, state_.modes, T(0));
-  std::fill_n(state_.loudness, places + modes_.outputs.size(), T(0));
+  std::fill_n(state_.sleep.debt, state_.shapes.modes, T(0));
+  std::fill_n(state_.sleep.loudness, places + modes_.outputs.size(), T(0));
 }
 
 // A mode's damping is not to act on what a force in the next sample adds. What sleeps wakes.
@@ -331,39 +333,41 @@ void ModalKernel<T>::strike(std::size_t, std::span<const std::uint32_t> nodes,
     if (modes_.is_crossed) {
       const std::complex<double> pole(1.0 + modes_.pole[i], modes_.pole[modes_.modes + i]);
       const std::complex<double> before = std::complex<double>(sum(4), sum(5)) / pole;
-      state_.q[i] += static_cast<T>(before.real());
-      state_.d[i] += static_cast<T>(before.imag());
+      state_.motion.q[i] += static_cast<T>(before.real());
+      state_.motion.d[i] += static_cast<T>(before.imag());
       continue;
     }
-    const double damping = state_.is_stale ? 0.0 : static_cast<double>(state_.z[i]);
-    const double gain = state_.root != nullptr ? static_cast<double>(state_.root[i]) : 1.0;
+    const double damping = state_.motion.is_stale ? 0.0 : static_cast<double>(state_.motion.z[i]);
+    const double gain =
+        state_.motion.root != nullptr ? static_cast<double>(state_.motion.root[i]) : 1.0;
     // What is damped in one sample is not there, as a mode that is left out above half the rate.
-    state_.d[i] += damping < 1.0 ? static_cast<T>(gain * sum(0) / (1.0 - damping)) : T(0);
+    state_.motion.d[i] += damping < 1.0 ? static_cast<T>(gain * sum(0) / (1.0 - damping)) : T(0);
   }
   wake_all();
 }
 
 template <class T>
 void ModalKernel<T>::wake_all() {
-  state_.awake = modes_.modes;
-  state_.swept = state_.modes;
-  state_.until_check = check_frames;
-  state_.is_long_check = false;
+  state_.sleep.awake = modes_.modes;
+  state_.sleep.swept = state_.shapes.modes;
+  state_.sleep.until_check = check_frames;
+  state_.sleep.is_long_check = false;
 }
 
 template <class T>
 Awake ModalKernel<T>::awake() const {
-  return {state_.awake, modes_.modes};
+  return {state_.sleep.awake, modes_.modes};
 }
 
 template <class T>
 double ModalKernel<T>::owed(std::size_t listener) const {
   const std::size_t places = modes_.places.size();
-  const T* const row = listener < places ? state_.places + listener * state_.row
-                                         : state_.outputs + (listener - places) * state_.row;
+  const T* const row = listener < places
+                           ? state_.shapes.places + listener * state_.shapes.row
+                           : state_.shapes.outputs + (listener - places) * state_.shapes.row;
   double sum = 0.0;
   for (std::size_t i = 0; i < modes_.modes; ++i) {
-    sum += std::fabs(static_cast<double>(row[i])) * static_cast<double>(state_.debt[i]);
+    sum += std::fabs(static_cast<double>(row[i])) * static_cast<double>(state_.sleep.debt[i]);
   }
   return sum;
 }
@@ -378,8 +382,8 @@ bool ModalKernel<T>::become(const Kernel<T>& from) {
   active_.links = other.active_.links;
   active_.alone = other.active_.alone;
   active_.clusters[0].count = other.active_.clusters[0].count;
-  static_cast<ModalPace<T>&>(state_) = other.state_;
-  state_.bundled_modes = 0;  // the rows are its own
+  state_.take_pace(other.state_);
+  state_.sweep.bundled_modes = 0;  // the rows are its own
   return true;
 }
 
@@ -392,7 +396,7 @@ template <class T>
 void ModalKernel<T>::play(const Block<T>& block) {
   state_.ramps = ramps_of(this->coefficients);
   step_(program_, modes_, state_, block);
-  if (state_.silence > 0) {
+  if (state_.sleep.silence > 0) {
     remember_peaks(block);
   }
   this->coefficients.finish(block.frames);
@@ -404,7 +408,7 @@ void ModalKernel<T>::remember_peaks(const Block<T>& block) {
   const std::size_t outputs = modes_.outputs.size();
   for (std::size_t o = 0; o < outputs; ++o) {
     const auto rest = static_cast<T>(modes_.outputs[o].place.rest);
-    T& loudness = state_.loudness[modes_.places.size() + o];
+    T& loudness = state_.sleep.loudness[modes_.places.size() + o];
     for (std::size_t n = 0; n < block.frames; ++n) {
       const T y = block.outputs[n * outputs + o];
       loudness = std::max(loudness, std::min(std::abs(y), std::abs(y - rest)));
@@ -419,8 +423,9 @@ std::size_t ModalKernel<T>::look(std::size_t, std::span<const std::uint32_t>,
     return 0;
   }
   for (std::size_t i = 0; i < modes_.modes; ++i) {
-    const double root = state_.root != nullptr ? static_cast<double>(state_.root[i]) : 1.0;
-    numbers[i] = root * static_cast<double>(state_.q[i]);
+    const double root =
+        state_.motion.root != nullptr ? static_cast<double>(state_.motion.root[i]) : 1.0;
+    numbers[i] = root * static_cast<double>(state_.motion.q[i]);
   }
   return modes_.modes;
 }
@@ -429,9 +434,11 @@ template <class T>
 bool ModalKernel<T>::is_near_start(std::size_t, double bound) const {
   double sum = 0.0;
   for (std::size_t i = 0; i < modes_.modes; ++i) {
-    const double root = state_.root != nullptr ? static_cast<double>(state_.root[i]) : 1.0;
-    const double moved = root * static_cast<double>(state_.q[i]) - modes_.q[i];
-    const double turned = modes_.is_crossed ? static_cast<double>(state_.d[i]) - modes_.d[i] : 0.0;
+    const double root =
+        state_.motion.root != nullptr ? static_cast<double>(state_.motion.root[i]) : 1.0;
+    const double moved = root * static_cast<double>(state_.motion.q[i]) - modes_.q[i];
+    const double turned =
+        modes_.is_crossed ? static_cast<double>(state_.motion.d[i]) - modes_.d[i] : 0.0;
     sum += moved * moved + turned * turned;
   }
   return modes_.reach * std::sqrt(sum) < bound;

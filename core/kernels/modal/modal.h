@@ -21,120 +21,207 @@ inline constexpr std::uint32_t long_check_frames = 128;  // ...while few are awa
 // So many passive links may be solved as modal_straight.h does: a pack of any kind.
 inline constexpr std::size_t most_straight = widest_bytes / sizeof(float);
 
-// Where a ModalKernel is, beside the numbers in its arrays.
+// The state of a ModalKernel: one object for each of its jobs. The arrays are the kernel's memory.
+// Rows of modes are `stride` apart and padded with zeros to `modes`, whole packs of every kind. An
+// end is a place or, numbered on from these, an element of Modes::ends. A listener is a place or,
+// numbered on from these, an output.
+//
+// The numbers that change and are not in arrays stand in a base of their own: become() copies them.
+
+// Shapes and factors as the form has them, in T. Constant, except that exact modes scale the
+// shapes.
 template <class T>
-struct ModalPace {
-  std::size_t awake = 0;  // the first so many modes are
+struct ModalShapes {
+  std::size_t modes;
+  std::size_t stride;
+  std::size_t row;      // numbers from one shape to the next; crossed modes have two parts of each
+  const T* stiffness;   // factors, of each share in the packs where it has any
+  const T* damping;     // the same
+  T* pushes;            // [push][mode], followed without a gap by places and outputs
+  T* places;            // [place][mode]
+  T* outputs;           // [output][mode]
+  const T* unscaled;    // [push, place, output][mode] of exact modes, as the form has them
+  T* speeds;            // [place][mode] of crossed modes: velocity of the place
+  const T* pole;        // [part][mode] of crossed modes, minus 1
+  const T* push_norm;   // [push] length of the shape
+  const T* place_norm;  // [place]
+};
+
+// The oscillators, d -= k q + z d, q += d, and how their coefficients change.
+struct ModalMotionPace {
+  bool is_stale = true;            // k, z and compliance do not follow from `used`
+  bool is_first = false;           // the first sample of crossed modes
+  std::uint32_t fresh_frames = 0;  // since set_state(); up to 2
+};
+template <class T>
+struct ModalMotion : ModalMotionPace {
+  T* q;       // [mode] displacement
+  T* d;       // [mode] change of q per sample
+  T* k;       // [mode] stiffness times inverse mass
+  T* z;       // [mode] damping times inverse mass
+  T* k_step;  // [mode] change of k per sample, exact modes only
+  T* z_step;  // [mode]
+  T* root;    // [mode] square root of the gain of the force, exact modes only; else null
+  T* used;    // [share of stiffness, share of damping, mass] coefficient in the last sample
+};
+
+// Which modes are awake, and what those that are asleep may add up to (modal_sleep.h).
+struct ModalSleepPace {
+  std::size_t awake = 0;  // modes [0, awake) are awake
   std::size_t swept = 0;  // the same in whole pairs of packs
-  std::size_t saved_awake = 0;
-  std::size_t bundled = 0;
+  std::uint32_t until_check = check_frames;
+  bool is_long_check = false;
+};
+template <class T>
+struct ModalSleep : ModalSleepPace {
+  T* spread;      // [mode] square of the amplitude per that of the state; 0: does not ring
+  T* decay;       // [mode] of an amplitude in check_frames
+  T* amplitude;   // [mode]
+  T* debt;        // [mode] amplitude of what was dropped
+  T* loudness;    // [listener] now or lately
+  T* room;        // [listener] what may still be dropped
+  T silence;      // share of `loudness` that may be dropped; 0: nothing sleeps
+  T lately_kept;  // of `loudness` in check_frames
+};
+
+// The rows that one pass over all modes takes along, and what it returns.
+struct ModalSweepPace {
+  std::size_t bundled = 0;  // rows in the bundle
   std::size_t bundled_modes = 0;
-  std::size_t pushing = 0;
-  std::uint32_t held_places = 0;
-  std::size_t held_links = 0;  // of both kinds
-  std::size_t links = 0;
-  bool is_first = false;  // the first sample of crossed modes
-  bool pulls = false;     // passive links do so from the second sample on
-  bool saved_pulls = false;
-  bool is_pushed = false;     // a passive link has pushed in the last sample
+};
+template <class T>
+struct ModalSweep : ModalSweepPace {
+  const T** rows;          // [row] wanted
+  const T** bundled_rows;  // [row] in the bundle
+  T* bundle;               // [pack][row][lane]
+  T* load;                 // [mode] sum of all forces, where there are too many rows for a bundle
+  T* kick;                 // [sample][row] added to d along a row
+  T* speed;                // [row] velocity of the row's place
+  T* heard;                // [sample][row] position
+  T* seen;                 // [row][frame] position, for a block
+};
+
+// What inputs and constant forces do to the modes.
+struct ModalInputsPace {
+  std::size_t pushing = 0;  // pushes that are not 0 in this block
+};
+template <class T>
+struct ModalInputs : ModalInputsPace {
+  std::uint32_t* push_of;  // [0, pushing) which these are
+  T* amplitude;            // [frame][push]
+  T* late;                 // [push] of the sample before, if it acts late
+};
+
+// Where the ends are, what acts on them, and how far the energy lets them move (modal_bounds.h).
+template <class T>
+struct ModalEndsPace {
+  bool has_bounds = false;
+  T kick_norm = 0;  // what the links added to the norm in their last block
+};
+template <class T>
+struct ModalEnds : ModalEndsPace<T> {
+  T* x;           // [end] position
+  T* v;           // [end] change per sample
+  T* force;       // [end] summed by the plain links, used by the next sample
+  T* exerted;     // [end] by passive links, in this sample
+  T* kicked;      // [place] sum of the sizes of a block's kicks
+  T* compliance;  // [place] greatest square of its displacement per energy
+};
+
+// The links that are computed in this block, and the places that they need.
+struct ModalHeldPace {
+  std::uint32_t places = 0;
+  std::size_t links = 0;               // that are computed, plain and passive
+  std::size_t all_links = 0;           // that there are
+  std::uint32_t touched_frames = 0;    // until a block is tried as a free one
+  std::uint32_t surprised_frames = 0;  // until fewer than all links are computed
+};
+template <class T>
+struct ModalHeld : ModalHeldPace {
+  std::uint32_t* row_of;    // [place] its row, or nowhere
+  std::uint32_t* place_of;  // [row] its place
+  std::uint32_t* count_of;  // [hold] how many of its links are computed
+  Ends* ends;               // [plain link that is computed]
+  T* give;                  // [plain link that is computed]
+};
+
+// The links of the holds that are not plain, in their order (modal_passive.h).
+struct ModalPassivePace {
+  bool pulls = false;         // they act from the second sample on
+  bool is_pushed = false;     // one has pushed in the last sample
   bool shoves_later = false;  // the next sweep adds `shove`
   bool is_reply_stale = true;
   bool is_straight_stale = true;
-  std::uint32_t touched_frames = 0;    // so long no block is tried as a free one
-  std::uint32_t surprised_frames = 0;  // so long all links are computed
-  T kick_norm = 0;                     // what the links added to the norm in their last block
-  bool is_stale = true;                // k, z and compliance are not those of `used`
-  std::uint32_t until_check = check_frames;
-  std::uint32_t fresh_frames = 0;  // since they were placed; up to 2
-  bool is_long_check = false;
-  bool has_bounds = false;  // the energy limits the motion
+};
+template <class T>
+struct ModalPassive : ModalPassivePace {
+  std::size_t count;
+  const PassiveLink* links;  // [link]
+  PassiveTables* active;     // those that are computed; their ends are {which link, nobody}
+  T* reply;                  // [listener][link] how far a push of 1 between its ends moves it, by w
+  T* gamma;                  // [link][link] how far a push of 1 closes another, by w
+  T* opening;                // [link] distance of its ends, once all has moved
+  T* rush;                   // [link] and its change per sample
+  T* memory;                 // [active][passive_rows]
+  T* numbers;                // workspace of the solver
+  T* straight;               // workspace of modal_straight.h
+  T* pushed;                 // [link] force
+  T* shove;                  // [row] what the forces add to q and d along the row of a place
+  const T* give;             // [link] as ModalHold::give
+  T* slack;                  // [link] the same, by the coefficients of now
+  T* yield;                  // [link] displacement of its ends by the modes that are left out
+  T* yield_step;             // [link] and its change in the last sample
 };
 
-// Everything that one step of ModalKernel touches. Rows of modes are `stride` apart and filled up
-// with zeros to `modes`, whole packs of every kind. Ends: the places, then Modes::ends. Listeners:
-// the places, then the outputs.
+// A copy of what a block may change, from its start: a block may have to be played again.
+struct ModalSavedPace {
+  std::size_t awake = 0;
+  bool pulls = false;
+};
 template <class T>
-struct ModalState : ModalPace<T> {
+struct ModalSaved : ModalSavedPace {
+  T* q;           // [mode]
+  T* d;           // [mode]
+  T* x;           // [end]
+  T* v;           // [end]
+  T* force;       // [place]
+  T* yield;       // [passive link]
+  T* yield_step;  // [passive link]
+};
+
+// Outputs that are forces.
+template <class T>
+struct ModalForces {
+  std::size_t count;
+  T* rows;   // [force][row of q, row of d][mode]
+  T* still;  // [force] with q and d at 0
+};
+
+template <class T>
+struct ModalState {
   Ramps<T> ramps;
-  std::size_t modes;
-  std::size_t stride;
-  std::size_t row;      // numbers from one shape to the next: crossed modes have two parts of each
-  const T* stiffness;   // factors, of each share in the packs where it has any
-  const T* damping;     // the same
-  T* pushes;            // [push][mode] shapes, and without a gap
-  T* places;            // [place][mode]
-  T* speeds;            // [place][mode] of crossed modes: how fast it is
-  const T* pole;        // [part][mode] of crossed modes, less 1
-  T* outputs;           // [output][mode]
-  std::size_t forces;   // outputs that are
-  T* felt;              // [output that is a force][row of q, row of d][mode]
-  T* felt_still;        // [output that is a force] with q and d at 0
-  T* exerted;           // [end] by passive links, in this sample
-  const T* push_norm;   // [push] length of the shape
-  const T* place_norm;  // [place]
-  T* q;                 // [mode]
-  T* d;                 // [mode] change of q per sample
-  T* saved_q;           // [mode] at the start of a block
-  T* saved_d;           // [mode]
-  T* k;                 // [mode] lK
-  T* z;                 // [mode] lZ
-  T* load;              // [mode] sum of all forces of a sample
-  T* bundle;            // [pack][row][lane] the rows that a sweep needs
-  T* used;              // [share of stiffness, share of damping, mass] coefficient when last used
-  T* late;              // [push] from the tick before, if it acts late
-  T* amplitude;         // [frame][push]
-  T* compliance;        // [place] greatest square of its displacement per energy
-  T* x;                 // [end] position
-  T* v;                 // [end] change per sample
-  T* force;             // [end] summed by the links, used by the next sample
-  T* saved_force;       // [place] at the start of a block
-  T* kicked;            // [place] sum of the sizes of a block's kicks
-  T* kick;              // [sample][row] what a sweep adds to d along a row
-  T* speed;             // [row] how fast the row's place moves after it
-  T* heard;             // [sample][row] where it is
-  T* seen;              // [row][frame] the same for a block
-  const T** rows;       // [row] that a sweep shall have
-  const T** bundled_rows;   // [row] that are in the bundle
-  std::uint32_t* push_of;   // [row] the pushes that push
-  std::uint32_t* row_of;    // [place] where it is among the rows, if it is
-  std::uint32_t* place_of;  // [row] its inverse
-  std::uint32_t* held;      // [hold] how many of its links are computed
-  Ends* held_ends;          // [link that is computed]
-  T* held_give;             // [link that is computed]
-  T* saved_x;               // [end] at the start of a block
-  T* saved_v;               // [end]
-  // Passive links: those of the holds that are not plain, in their order, and which of them are
-  // computed (`active`, whose ends are {which passive link, nobody}).
-  std::size_t passives;
-  const PassiveLink* passive;  // [passive link]
-  PassiveTables* active;       // never more than there are passive links
-  T* reply;        // [listener][passive link] how far a push of 1 between its ends moves it, by w
-  T* gamma;        // [passive link][passive link] how far a push of 1 closes another, by w
-  T* opening;      // [passive link] the distance of its ends, once all has moved
-  T* rush;         // [passive link] and its change per sample
-  T* memory;       // [active][passive_rows]
-  T* numbers;      // that solving them needs
-  T* pushed;       // [passive link] what it exerts
-  const T* give;   // [passive link] as ModalHold::give
-  T* slack;        // [passive link] the same, by the coefficients of now
-  T* yield;        // [passive link] how far it has given way by what is left out
-  T* yield_step;   // [passive link] and in the last sample
-  T* saved_yield;  // [passive link]
-  T* saved_yield_step;  // [passive link]
-  T* straight;          // what modal_straight.h keeps
-  T* shove;             // [row] what passive links add to q and d along the row of a place
-  const T* shape;       // [push, place, output][mode] as they are written, if is_exact
-  T* root;              // [mode] of the gain that all of these have, if is_exact
-  T* k_step;            // [mode] per sample, if is_exact
-  T* z_step;            // [mode]
-  T* spread;            // [mode] square of the amplitude per that of the state; 0: does not ring
-  T* decay;             // [mode] of an amplitude in check_frames
-  T* swing;             // [mode] amplitude
-  T* debt;              // [mode] amplitude of what was dropped
-  T* loudness;          // [listener] as modal_sleep.h says, now or lately
-  T* room;              // [listener] what may still be dropped
-  T silence;            // share of `loudness` that may be dropped; 0: nothing sleeps
-  T lately_kept;        // of `loudness` in check_frames
+  ModalShapes<T> shapes;
+  ModalMotion<T> motion;
+  ModalSleep<T> sleep;
+  ModalSweep<T> sweep;
+  ModalInputs<T> inputs;
+  ModalEnds<T> ends;
+  ModalHeld<T> held;
+  ModalPassive<T> passive;
+  ModalSaved<T> saved;
+  ModalForces<T> forces;
+
+  // Copies everything that changes and is not in an array.
+  void take_pace(const ModalState& from) {
+    static_cast<ModalMotionPace&>(motion) = from.motion;
+    static_cast<ModalSleepPace&>(sleep) = from.sleep;
+    static_cast<ModalSweepPace&>(sweep) = from.sweep;
+    static_cast<ModalInputsPace&>(inputs) = from.inputs;
+    static_cast<ModalEndsPace<T>&>(ends) = from.ends;
+    static_cast<ModalHeldPace&>(held) = from.held;
+    static_cast<ModalPassivePace&>(passive) = from.passive;
+    static_cast<ModalSavedPace&>(saved) = from.saved;
+  }
 };
 
 template <class T>

@@ -35,19 +35,19 @@ struct Range {
 template <class T>
 bool measure_compliance(ModalState<T>& s, std::size_t places) {
   for (std::size_t p = 0; p < places; ++p) {
-    s.compliance[p] = 0;
+    s.ends.compliance[p] = 0;
   }
-  for (std::size_t i = 0; i < s.modes; ++i) {
-    const T k = s.k[i];
-    const T m = 1 - s.z[i] / 2 - k / 4;
-    if (!(k >= 0 && s.z[i] >= 0 && m > T(least_mass))) {
+  for (std::size_t i = 0; i < s.shapes.modes; ++i) {
+    const T k = s.motion.k[i];
+    const T m = 1 - s.motion.z[i] / 2 - k / 4;
+    if (!(k >= 0 && s.motion.z[i] >= 0 && m > T(least_mass))) {
       return false;
     }
     const T drift = T(drift_frames) * (1 + 1 / m);
     const T square = T(least_stiffness) > k ? drift * drift : 1 / k + 1 / (4 * m);
     for (std::size_t p = 0; p < places; ++p) {
-      const T shape = s.places[p * s.row + i];
-      s.compliance[p] += shape * shape * square;
+      const T shape = s.shapes.places[p * s.shapes.row + i];
+      s.ends.compliance[p] += shape * shape * square;
     }
   }
   return true;
@@ -58,10 +58,10 @@ T energy(const ModalState<T>& s) {
   using V = ModePack<T>;
   V sum{};
   for (std::size_t i = 0; i < pack_count(s); ++i) {
-    const V k = packs(s.k)[i];
-    const V q = packs(s.q)[i];
-    const V d = packs(s.d)[i];
-    const V m = 1 - packs(s.z)[i] / 2 - k / 4;
+    const V k = packs(s.motion.k)[i];
+    const V q = packs(s.motion.q)[i];
+    const V d = packs(s.motion.d)[i];
+    const V m = 1 - packs(s.motion.z)[i] / 2 - k / 4;
     const V middle = q - d / 2;
     const V soft =
         select(k < V{} + T(least_stiffness), V{} + T(1 / (drift_frames * drift_frames)), V{});

@@ -81,21 +81,21 @@ void make_exact(ModalState<T>& s, std::size_t shapes, T* k, T* z) {
     for (std::size_t lane = 0; lane < mode_lanes<T>; ++lane) {
       root[lane] = std::sqrt(gain[lane]);
     }
-    const V change = packs(s.root)[i] / root;
-    packs(s.root)[i] = root;
-    packs(s.q)[i] *= change;
-    packs(s.d)[i] *= change;
-    packs(s.debt)[i] *= change;
+    const V change = packs(s.motion.root)[i] / root;
+    packs(s.motion.root)[i] = root;
+    packs(s.motion.q)[i] *= change;
+    packs(s.motion.d)[i] *= change;
+    packs(s.sleep.debt)[i] *= change;
   }
   for (std::size_t row = 0; row < shapes; ++row) {
-    const V* const shape = packs(s.shape + row * s.stride);
-    V* const scaled = packs(s.pushes + row * s.stride);
+    const V* const shape = packs(s.shapes.unscaled + row * s.shapes.stride);
+    V* const scaled = packs(s.shapes.pushes + row * s.shapes.stride);
     for (std::size_t i = 0; i < all_packs(s); ++i) {
-      scaled[i] = shape[i] * packs(s.root)[i];
+      scaled[i] = shape[i] * packs(s.motion.root)[i];
     }
   }
-  s.bundled_modes = 0;
-  s.is_reply_stale = true;
+  s.sweep.bundled_modes = 0;
+  s.passive.is_reply_stale = true;
 }
 
 }  // namespace

@@ -25,20 +25,20 @@ struct Holder : ModeMixer<T, Crossed> {
   const std::size_t inputs = program.inputs.size();
 
   void wake() {
-    if (s.awake < modes.modes) {
+    if (s.sleep.awake < modes.modes) {
       stay_awake(s, modes.modes);
-      s.until_check = check_frames;
-      s.is_long_check = false;
+      s.sleep.until_check = check_frames;
+      s.sleep.is_long_check = false;
     }
   }
   // Whether a link has pulled in the last sample.
   bool is_held() const {
     for (std::size_t p = 0; p < places; ++p) {
-      if (s.force[p] != 0) {
+      if (s.ends.force[p] != 0) {
         return true;
       }
     }
-    return s.is_pushed;
+    return s.passive.is_pushed;
   }
 
   // --- where things can be --------------------------------------------------------------------
@@ -53,8 +53,8 @@ struct Holder : ModeMixer<T, Crossed> {
   void move_ends(std::size_t n) {
     for (std::size_t i = 0; i < modes.ends.size(); ++i) {
       if (modes.ends[i].follows) {
-        s.x[places + i] = block.value[n * inputs + modes.ends[i].input];
-        s.v[places + i] = block.velocity[n * inputs + modes.ends[i].input];
+        s.ends.x[places + i] = block.value[n * inputs + modes.ends[i].input];
+        s.ends.v[places + i] = block.velocity[n * inputs + modes.ends[i].input];
       }
     }
   }
@@ -65,9 +65,9 @@ struct Holder : ModeMixer<T, Crossed> {
     for (std::size_t j = 0; j < pushes; ++j) {
       T sum = 0;
       for (std::size_t n = first; n < first + frames; ++n) {
-        sum += absolute(s.amplitude[n * pushes + j]);
+        sum += absolute(s.inputs.amplitude[n * pushes + j]);
       }
-      norm += norm_of_kicks(sum, s.push_norm[j]);
+      norm += norm_of_kicks(sum, s.shapes.push_norm[j]);
     }
     return norm;
   }
@@ -75,12 +75,12 @@ struct Holder : ModeMixer<T, Crossed> {
   // Where an end can be in a block, and in the two samples before it.
   Range<T> range_of(std::uint32_t end, std::size_t first, std::size_t frames, T norm) const {
     if (end < places) {
-      const T reach = T(1.001) * norm * std::sqrt(s.compliance[end]);
+      const T reach = T(1.001) * norm * std::sqrt(s.ends.compliance[end]);
       const T rest = static_cast<T>(modes.places[end].rest);
       return {rest - reach, rest + reach};
     }
-    Range<T> range{s.x[end], s.x[end]};
-    range.take(s.x[end] - s.v[end]);
+    Range<T> range{s.ends.x[end], s.ends.x[end]};
+    range.take(s.ends.x[end] - s.ends.v[end]);
     for (std::size_t n = first; n < first + frames && modes.ends[end - places].follows; ++n) {
       range.take(position_of(end, n));
     }
@@ -88,7 +88,7 @@ struct Holder : ModeMixer<T, Crossed> {
   }
   bool may_act_within(const LinkRun& run, std::uint32_t a, std::uint32_t b, std::size_t first,
                       std::size_t frames, T norm) const {
-    if (!s.has_bounds) {
+    if (!s.ends.has_bounds) {
       return true;
     }
     const Range<T> at = range_of(a, first, frames, norm);
@@ -100,26 +100,26 @@ struct Holder : ModeMixer<T, Crossed> {
 
   // Everything that a block may change, but for what is counted.
   void save() {
-    s.saved_awake = s.awake;
-    keep(s, s.saved_q, s.q);
-    keep(s, s.saved_d, s.d);
-    std::copy_n(s.force, places, s.saved_force);
-    std::copy_n(s.x, places + modes.ends.size(), s.saved_x);
-    std::copy_n(s.v, places + modes.ends.size(), s.saved_v);
-    std::copy_n(s.yield, s.passives, s.saved_yield);
-    std::copy_n(s.yield_step, s.passives, s.saved_yield_step);
-    s.saved_pulls = s.pulls;
+    s.saved.awake = s.sleep.awake;
+    keep(s, s.saved.q, s.motion.q);
+    keep(s, s.saved.d, s.motion.d);
+    std::copy_n(s.ends.force, places, s.saved.force);
+    std::copy_n(s.ends.x, places + modes.ends.size(), s.saved.x);
+    std::copy_n(s.ends.v, places + modes.ends.size(), s.saved.v);
+    std::copy_n(s.passive.yield, s.passive.count, s.saved.yield);
+    std::copy_n(s.passive.yield_step, s.passive.count, s.saved.yield_step);
+    s.saved.pulls = s.passive.pulls;
   }
   void restore() {
-    keep(s, s.q, s.saved_q);
-    keep(s, s.d, s.saved_d);
-    stay_awake(s, s.saved_awake);
-    std::copy_n(s.saved_force, places, s.force);
-    std::copy_n(s.saved_x, places + modes.ends.size(), s.x);
-    std::copy_n(s.saved_v, places + modes.ends.size(), s.v);
-    std::copy_n(s.saved_yield, s.passives, s.yield);
-    std::copy_n(s.saved_yield_step, s.passives, s.yield_step);
-    s.pulls = s.saved_pulls;
+    keep(s, s.motion.q, s.saved.q);
+    keep(s, s.motion.d, s.saved.d);
+    stay_awake(s, s.saved.awake);
+    std::copy_n(s.saved.force, places, s.ends.force);
+    std::copy_n(s.saved.x, places + modes.ends.size(), s.ends.x);
+    std::copy_n(s.saved.v, places + modes.ends.size(), s.ends.v);
+    std::copy_n(s.saved.yield, s.passive.count, s.passive.yield);
+    std::copy_n(s.saved.yield_step, s.passive.count, s.passive.yield_step);
+    s.passive.pulls = s.saved.pulls;
   }
 
   void hold_all() {
@@ -127,36 +127,36 @@ struct Holder : ModeMixer<T, Crossed> {
   }
   void hold_some(std::size_t first, std::size_t frames, T norm) {
     hold_if([&](const LinkRun& run, std::uint32_t a, std::uint32_t b) {
-      return (a < places && s.force[a] != 0) || (b < places && s.force[b] != 0) ||
+      return (a < places && s.ends.force[a] != 0) || (b < places && s.ends.force[b] != 0) ||
              may_act_within(run, a, b, first, frames, norm);
     });
   }
   // Chooses the links that are computed and the places that they need.
   template <class Condition>
   void hold_if(Condition&& condition) {
-    std::fill_n(s.row_of, places, nowhere);
-    s.held_links = 0;
-    s.links = 0;
-    s.held_places = 0;
-    s.active->links.clear();
+    std::fill_n(s.held.row_of, places, nowhere);
+    s.held.links = 0;
+    s.held.all_links = 0;
+    s.held.places = 0;
+    s.passive.active->links.clear();
     std::uint32_t passive = 0;
     std::size_t plain = 0;
     for (std::size_t h = 0; h < modes.holds.size(); ++h) {
       const ModalHold& hold = modes.holds[h];
       const LinkRun& run = program.link_runs[hold.run];
       const bool is_plain = run.scheme == Scheme::plain;
-      s.held[h] = 0;
-      for (std::size_t i = 0; i < hold.a.size(); ++i, ++s.links) {
+      s.held.count_of[h] = 0;
+      for (std::size_t i = 0; i < hold.a.size(); ++i, ++s.held.all_links) {
         const bool is_held = condition(run, hold.a[i], hold.b[i]);
         if (is_held) {
-          ++s.held_links;
+          ++s.held.links;
           hold_place(hold.a[i]);
           hold_place(hold.b[i]);
         }
         if (is_plain && is_held) {
-          s.held_give[plain] = hold.give.empty() ? T(0) : static_cast<T>(hold.give[i]);
-          s.held_ends[plain++] = {hold.a[i], hold.b[i]};
-          ++s.held[h];
+          s.held.give[plain] = hold.give.empty() ? T(0) : static_cast<T>(hold.give[i]);
+          s.held.ends[plain++] = {hold.a[i], hold.b[i]};
+          ++s.held.count_of[h];
         }
         if (!is_plain) {
           hold_passive(passive++, is_held);
@@ -164,23 +164,23 @@ struct Holder : ModeMixer<T, Crossed> {
       }
     }
     // One alone, or all of them at once by what each moves the others.
-    const std::size_t active = s.active->links.size();
-    s.active->alone = active == 1 ? 1 : 0;
-    s.active->clusters[0].count = active == 1 ? 0 : static_cast<std::uint32_t>(active);
+    const std::size_t active = s.passive.active->links.size();
+    s.passive.active->alone = active == 1 ? 1 : 0;
+    s.passive.active->clusters[0].count = active == 1 ? 0 : static_cast<std::uint32_t>(active);
   }
   void hold_place(std::uint32_t end) {
-    if (end < places && s.row_of[end] == nowhere) {
-      s.row_of[end] = s.held_places;
-      s.place_of[s.held_places++] = end;
+    if (end < places && s.held.row_of[end] == nowhere) {
+      s.held.row_of[end] = s.held.places;
+      s.held.place_of[s.held.places++] = end;
     }
   }
   void hold_passive(std::uint32_t link, bool is_held) {
     if (!is_held) {
-      s.yield[link] = s.yield_step[link] = s.pushed[link] = 0;
+      s.passive.yield[link] = s.passive.yield_step[link] = s.passive.pushed[link] = 0;
       return;
     }
-    s.active->links.push_back(s.passive[link]);
-    s.active->links.back().ends = {link, nowhere};
+    s.passive.active->links.push_back(s.passive.links[link]);
+    s.passive.active->links.back().ends = {link, nowhere};
   }
 };
 

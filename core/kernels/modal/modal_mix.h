@@ -23,7 +23,7 @@ struct ModeMixer {
     if (s.ramps.frames > 0) {
       return s.ramps.frames;
     }
-    const T* used = s.used;
+    const T* used = s.motion.used;
     bool is_same = true;
     for (const ModalShare& share : modes.stiffness) {
       is_same &= *used++ == coefficient(share.coefficient);
@@ -52,17 +52,17 @@ struct ModeMixer {
         modes.inverse_mass == Modes::own_mass ? T(1) : coefficient(modes.inverse_mass, ahead);
     if constexpr (Crossed) {
       // Placed a sample ahead, in the first one nothing moves them but what pushes.
-      s.is_first = *s.used == 0;
-      const T here = s.is_first ? T(0) : T(1);
+      s.motion.is_first = *s.motion.used == 0;
+      const T here = s.motion.is_first ? T(0) : T(1);
       for (std::size_t i = 0; i < all_packs(s); ++i) {
-        packs(k)[i] = here * packs(s.pole)[i];
-        packs(z)[i] = here * packs(s.pole + s.stride)[i];
+        packs(k)[i] = here * packs(s.shapes.pole)[i];
+        packs(z)[i] = here * packs(s.shapes.pole + s.shapes.stride)[i];
       }
-      *s.used = w;
+      *s.motion.used = w;
       return;
     }
-    T* used = mix(modes.stiffness, s.stiffness, ahead, w, k, s.used);
-    used = mix(modes.damping, s.damping, ahead, w, z, used);
+    T* used = mix(modes.stiffness, s.shapes.stiffness, ahead, w, k, s.motion.used);
+    used = mix(modes.damping, s.shapes.damping, ahead, w, z, used);
     *used = w;
     if (modes.is_exact) {
       make_exact(s, modes.pushes.size() + modes.places.size() + modes.outputs.size(), k, z);
@@ -96,8 +96,8 @@ struct ModeMixer {
       if (!output.is_force) {
         continue;
       }
-      T* const rows = s.felt + 2 * force * s.stride;
-      std::fill_n(rows, 2 * s.stride, T(0));
+      T* const rows = s.forces.rows + 2 * force * s.shapes.stride;
+      std::fill_n(rows, 2 * s.shapes.stride, T(0));
       T still = 0;
       for (const ModalForce::Part& part : output.force.parts) {
         const T c = coefficient(part.coefficient);
@@ -105,32 +105,33 @@ struct ModeMixer {
         for (std::size_t i = 0; i < part.shape.size(); ++i) {
           const std::size_t mode = i % modes.modes;
           const bool is_second = Crossed ? i >= modes.modes : part.is_damping;
-          const T root = modes.is_exact && !Crossed ? s.root[mode] : T(1);
-          rows[(is_second ? s.stride : 0) + mode] += c * root * static_cast<T>(part.shape[i]);
+          const T root = modes.is_exact && !Crossed ? s.motion.root[mode] : T(1);
+          rows[(is_second ? s.shapes.stride : 0) + mode] +=
+              c * root * static_cast<T>(part.shape[i]);
         }
         still += c * static_cast<T>(part.constant);
       }
-      s.felt_still[force++] = still;
+      s.forces.still[force++] = still;
     }
   }
 
   // Between here and some samples on exact coefficients move in a straight line: gives how many.
   // What has just been placed is pulled by nothing in its first sample.
   std::size_t begin_exact(std::size_t frames) {
-    frames = s.fresh_frames < 2 ? 1 : frames;
-    s.fresh_frames += s.fresh_frames < 2;
-    mix(frames, s.k_step, s.z_step);
+    frames = s.motion.fresh_frames < 2 ? 1 : frames;
+    s.motion.fresh_frames += s.motion.fresh_frames < 2;
+    mix(frames, s.motion.k_step, s.motion.z_step);
     const T share = T(1) / static_cast<T>(frames);
     for (std::size_t i = 0; i < all_packs(s); ++i) {
-      packs(s.k_step)[i] = share * (packs(s.k_step)[i] - packs(s.k)[i]);
-      packs(s.z_step)[i] = share * (packs(s.z_step)[i] - packs(s.z)[i]);
+      packs(s.motion.k_step)[i] = share * (packs(s.motion.k_step)[i] - packs(s.motion.k)[i]);
+      packs(s.motion.z_step)[i] = share * (packs(s.motion.z_step)[i] - packs(s.motion.z)[i]);
     }
     return frames;
   }
   void advance_exact() {
     for (std::size_t i = 0; i < all_packs(s); ++i) {
-      packs(s.k)[i] += packs(s.k_step)[i];
-      packs(s.z)[i] += packs(s.z_step)[i];
+      packs(s.motion.k)[i] += packs(s.motion.k_step)[i];
+      packs(s.motion.z)[i] += packs(s.motion.z_step)[i];
     }
   }
 };

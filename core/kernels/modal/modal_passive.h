@@ -20,23 +20,24 @@ template <bool Crossed, class T>
 void measure_replies(ModalState<T>& s, std::size_t places, std::size_t outputs) {
   for (std::size_t l = 0; l < places + outputs; ++l) {
     const T* const row = listener(s, places, l);
-    for (std::size_t i = 0; i < s.passives; ++i) {
+    for (std::size_t i = 0; i < s.passive.count; ++i) {
       T sum = 0;
       for (const bool is_b : {false, true}) {
-        const std::uint32_t end = is_b ? s.passive[i].ends.b : s.passive[i].ends.a;
+        const std::uint32_t end = is_b ? s.passive.links[i].ends.b : s.passive.links[i].ends.a;
         if (end < places) {
-          const T moved = reply<Crossed>(s, row, s.places + end * s.row);
+          const T moved = reply<Crossed>(s, row, s.shapes.places + end * s.shapes.row);
           sum += is_b ? -moved : moved;
         }
       }
-      s.reply[l * s.passives + i] = sum;
+      s.passive.reply[l * s.passive.count + i] = sum;
     }
   }
-  for (std::size_t i = 0; i < s.passives; ++i) {
-    for (std::size_t k = 0; k < s.passives; ++k) {
-      const auto [a, b] = s.passive[i].ends;
-      s.gamma[i * s.passives + k] = (a < places ? s.reply[a * s.passives + k] : T(0)) -
-                                    (b < places ? s.reply[b * s.passives + k] : T(0));
+  for (std::size_t i = 0; i < s.passive.count; ++i) {
+    for (std::size_t k = 0; k < s.passive.count; ++k) {
+      const auto [a, b] = s.passive.links[i].ends;
+      s.passive.gamma[i * s.passive.count + k] =
+          (a < places ? s.passive.reply[a * s.passive.count + k] : T(0)) -
+          (b < places ? s.passive.reply[b * s.passive.count + k] : T(0));
     }
   }
 }
@@ -45,30 +46,31 @@ void measure_replies(ModalState<T>& s, std::size_t places, std::size_t outputs) 
 template <class T>
 struct ModalBody {
   CoefficientView<T> coefficients() const { return {s.ramps.value}; }
-  T awake() const { return s.pulls ? T(1) : T(0); }
+  T awake() const { return s.passive.pulls ? T(1) : T(0); }
   T distance_now(Ends link) const {
-    const auto [a, b] = s.passive[link.a].ends;
-    return s.x[a] - s.x[b] + s.yield[link.a];
+    const auto [a, b] = s.passive.links[link.a].ends;
+    return s.ends.x[a] - s.ends.x[b] + s.passive.yield[link.a];
   }
   T speed_now(Ends link) const {
-    const auto [a, b] = s.passive[link.a].ends;
-    return s.v[a] - s.v[b] + s.yield_step[link.a];
+    const auto [a, b] = s.passive.links[link.a].ends;
+    return s.ends.v[a] - s.ends.v[b] + s.passive.yield_step[link.a];
   }
-  T distance(Ends link) const { return s.opening[link.a]; }
-  T speed(Ends link) const { return s.rush[link.a]; }
+  T distance(Ends link) const { return s.passive.opening[link.a]; }
+  T speed(Ends link) const { return s.passive.rush[link.a]; }
   T gamma(Ends link) const { return give(link.a, link.a); }
   T coupling(Ends one, Ends other) const { return give(one.a, other.a); }
   void push(Ends link, T force) {
-    s.pushed[link.a] = force;
-    for (const PassiveLink& other : s.active->links) {
+    s.passive.pushed[link.a] = force;
+    for (const PassiveLink& other : s.passive.active->links) {
       const T moved = give(other.ends.a, link.a) * force;
-      s.opening[other.ends.a] -= moved;
-      s.rush[other.ends.a] -= moved;
+      s.passive.opening[other.ends.a] -= moved;
+      s.passive.rush[other.ends.a] -= moved;
     }
   }
 
   T give(std::uint32_t at, std::uint32_t from) const {
-    return w * s.gamma[at * s.passives + from] + (at == from ? s.slack[at] : T(0));
+    return w * s.passive.gamma[at * s.passive.count + from] +
+           (at == from ? s.passive.slack[at] : T(0));
   }
 
   ModalState<T>& s;
@@ -83,72 +85,76 @@ struct Presser : Holder<T, Crossed> {
   using Base::places;
   using Base::s;
 
-  bool presses() const { return !s.active->links.empty(); }
+  bool presses() const { return !s.passive.active->links.empty(); }
 
   // Whether what passive links push may wait for the next sample's sweep: where that kicks nothing
   // else, and nobody looks at the modes before.
   bool may_shove_later() const {
-    const bool is_all = std::all_of(s.held, s.held + modes.holds.size(),
+    const bool is_all = std::all_of(s.held.count_of, s.held.count_of + modes.holds.size(),
                                     [](std::uint32_t plain) { return plain == 0; });
-    return presses() && is_all && s.pushing == 0 && s.forces == 0 && s.held_places <= most_kicked;
+    return presses() && is_all && s.inputs.pushing == 0 && s.forces.count == 0 &&
+           s.held.places <= most_kicked;
   }
   // What has waited.
   void shove_now() {
-    if (std::exchange(s.shoves_later, false)) {
+    if (std::exchange(s.passive.shoves_later, false)) {
       shove_rows<Crossed>(s);
     }
   }
 
   // As a run of samples begins, or in each whose coefficients move.
   void measure_passive() {
-    if (s.is_reply_stale) {
+    if (s.passive.is_reply_stale) {
       measure_replies<Crossed>(s, places, outputs);
-      s.is_reply_stale = false;
+      s.passive.is_reply_stale = false;
     }
-    s.is_straight_stale = true;
-    for (std::size_t i = 0; i < s.passives; ++i) {
-      s.slack[i] = s.give[i] > 0 ? s.give[i] / this->coefficient(modes.give_by) : T(0);
+    s.passive.is_straight_stale = true;
+    for (std::size_t i = 0; i < s.passive.count; ++i) {
+      s.passive.slack[i] =
+          s.passive.give[i] > 0 ? s.passive.give[i] / this->coefficient(modes.give_by) : T(0);
     }
   }
 
-  void remember_passive() { remember(*s.active, s.memory, ModalBody<T>{s, this->inverse_mass()}); }
+  void remember_passive() {
+    remember(*s.passive.active, s.passive.memory, ModalBody<T>{s, this->inverse_mass()});
+  }
 
   // Once everything else has moved: finds what the links push with, and moves places, what is heard
   // and the modes. Gives whether any pushes.
   bool press() {
     const T w = this->inverse_mass();
-    T* row = s.memory;
-    for (const PassiveLink& link : s.active->links) {
+    T* row = s.passive.memory;
+    for (const PassiveLink& link : s.passive.active->links) {
       const std::uint32_t i = link.ends.a;
-      const auto [a, b] = s.passive[i].ends;
-      s.opening[i] = s.x[a] - s.x[b];
-      s.rush[i] = s.v[a] - s.v[b] - s.yield[i];
-      row[2] = s.pushed[i];  // where looking for it begins
+      const auto [a, b] = s.passive.links[i].ends;
+      s.passive.opening[i] = s.ends.x[a] - s.ends.x[b];
+      s.passive.rush[i] = s.ends.v[a] - s.ends.v[b] - s.passive.yield[i];
+      row[2] = s.passive.pushed[i];  // where looking for it begins
       row += passive_rows;
     }
     ModalBody<T> body{s, w};
     if (!push_straight(s, body)) {
-      correct(*s.active, s.memory, s.numbers, body);
+      correct(*s.passive.active, s.passive.memory, s.passive.numbers, body);
     }
-    s.pulls = true;
-    std::fill_n(s.shove, s.held_places, T(0));
+    s.passive.pulls = true;
+    std::fill_n(s.passive.shove, s.held.places, T(0));
     bool pushes = false;
-    for (const PassiveLink& link : s.active->links) {
+    for (const PassiveLink& link : s.passive.active->links) {
       const std::uint32_t i = link.ends.a;
-      const T force = s.pushed[i];
-      s.yield_step[i] = -s.yield[i] - s.slack[i] * force;
-      s.yield[i] = -s.slack[i] * force;
+      const T force = s.passive.pushed[i];
+      s.passive.yield_step[i] = -s.passive.yield[i] - s.passive.slack[i] * force;
+      s.passive.yield[i] = -s.passive.slack[i] * force;
       pushes |= force != 0;
-      shove(s.passive[i].ends.a, -force);
-      shove(s.passive[i].ends.b, force);
+      shove(s.passive.links[i].ends.a, -force);
+      shove(s.passive.links[i].ends.b, force);
     }
-    for (std::size_t r = 0; pushes && r < s.held_places; ++r) {
-      const T way = moved(s.place_of[r]);
-      s.x[s.place_of[r]] -= way;
-      s.v[s.place_of[r]] -= way;
+    for (std::size_t r = 0; pushes && r < s.held.places; ++r) {
+      const T way = moved(s.held.place_of[r]);
+      s.ends.x[s.held.place_of[r]] -= way;
+      s.ends.v[s.held.place_of[r]] -= way;
     }
     for (std::size_t o = 0; pushes && o < outputs; ++o) {
-      s.heard[o] -= moved(places + o);
+      s.sweep.heard[o] -= moved(places + o);
     }
     if (pushes) {
       move_by_shoves();
@@ -160,27 +166,28 @@ struct Presser : Holder<T, Crossed> {
   // How far all pushes move a listener.
   T moved(std::size_t listener) const {
     T sum = 0;
-    for (const PassiveLink& link : s.active->links) {
-      sum += s.reply[listener * s.passives + link.ends.a] * s.pushed[link.ends.a];
+    for (const PassiveLink& link : s.passive.active->links) {
+      sum +=
+          s.passive.reply[listener * s.passive.count + link.ends.a] * s.passive.pushed[link.ends.a];
     }
     return this->inverse_mass() * sum;
   }
   void shove(std::uint32_t end, T force) {
-    s.exerted[end] += force;
+    s.ends.exerted[end] += force;
     if (end < places) {
       const T kick = this->inverse_mass() * force;
-      s.shove[s.row_of[end]] += kick;
-      s.kicked[end] += absolute(kick);
+      s.passive.shove[s.held.row_of[end]] += kick;
+      s.ends.kicked[end] += absolute(kick);
     }
   }
   void move_by_shoves() {
-    if (s.awake < modes.modes) {
+    if (s.sleep.awake < modes.modes) {
       this->wake();
-      if (s.held_places + s.pushing <= most_kicked) {
-        bundle<Crossed>(s, s.bundled);
+      if (s.held.places + s.inputs.pushing <= most_kicked) {
+        bundle<Crossed>(s, s.sweep.bundled);
       }
     }
-    if (!s.shoves_later) {
+    if (!s.passive.shoves_later) {
       shove_rows<Crossed>(s);
     }
   }

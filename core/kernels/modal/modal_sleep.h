@@ -33,7 +33,7 @@ constexpr double endless = 1e15;        // the amplitude of what does not ring, 
 // What is left, after an interval as long as the last, of what a short one leaves `kept` of.
 template <class V, class T>
 V after_check(const ModalState<T>& s, V kept) {
-  for (std::size_t i = 0; s.is_long_check && i < long_check_doublings; ++i) {
+  for (std::size_t i = 0; s.sleep.is_long_check && i < long_check_doublings; ++i) {
     kept *= kept;
   }
   return kept;
@@ -41,7 +41,8 @@ V after_check(const ModalState<T>& s, V kept) {
 
 template <class T>
 const T* listener(const ModalState<T>& s, std::size_t places, std::size_t l) {
-  return l < places ? s.places + l * s.row : s.outputs + (l - places) * s.row;
+  return l < places ? s.shapes.places + l * s.shapes.row
+                    : s.shapes.outputs + (l - places) * s.shapes.row;
 }
 
 // How the modes ring, with the coefficients of now. Where a stiffness has fallen, what is owed
@@ -50,22 +51,22 @@ template <class T>
 void measure_ringing(ModalState<T>& s) {
   using V = ModePack<T>;
   for (std::size_t i = 0; i < all_packs(s); ++i) {
-    const V k = packs(s.k)[i];
-    const V z = packs(s.z)[i];
+    const V k = packs(s.motion.k)[i];
+    const V z = packs(s.motion.z)[i];
     const V left = 1 - z;
     const V half = (k + z) / 2;
     const V depth = k - half * half;
     const V spread = select(depth > T(least_ringing) * k, left / depth, V{});
-    const V before = packs(s.spread)[i];
+    const V before = packs(s.sleep.spread)[i];
     const V wider = select(before > V{}, spread / before, V{} + 1);
-    packs(s.spread)[i] = select(left > V{}, spread, V{});
+    packs(s.sleep.spread)[i] = select(left > V{}, spread, V{});
     V decay = select(left > V{}, left, V{});
     for (std::size_t j = 0; j < check_doublings; ++j) {
       decay *= decay;
     }
-    packs(s.decay)[i] = decay;
+    packs(s.sleep.decay)[i] = decay;
     for (std::size_t lane = 0; lane < mode_lanes<T>; ++lane) {
-      s.debt[i * mode_lanes<T> + lane] *= wider[lane] > 1 ? std::sqrt(wider[lane]) : T(1);
+      s.sleep.debt[i * mode_lanes<T> + lane] *= wider[lane] > 1 ? std::sqrt(wider[lane]) : T(1);
     }
   }
 }
@@ -74,16 +75,16 @@ template <class T>
 void measure_amplitudes(ModalState<T>& s) {
   using V = ModePack<T>;
   for (std::size_t i = 0; i < pack_count(s); ++i) {
-    const V k = packs(s.k)[i];
-    const V z = packs(s.z)[i];
-    const V q = packs(s.q)[i];
-    const V d = packs(s.d)[i];
-    const V square = (k * q * q + (z - k) * q * d + (1 - z) * d * d) * packs(s.spread)[i];
+    const V k = packs(s.motion.k)[i];
+    const V z = packs(s.motion.z)[i];
+    const V q = packs(s.motion.q)[i];
+    const V d = packs(s.motion.d)[i];
+    const V square = (k * q * q + (z - k) * q * d + (1 - z) * d * d) * packs(s.sleep.spread)[i];
     const V state = T(endless) * (absolute(q) + absolute(d));
     for (std::size_t lane = 0; lane < mode_lanes<T>; ++lane) {
-      s.swing[i * mode_lanes<T> + lane] = packs(s.spread)[i][lane] > 0
-                                              ? std::sqrt(square[lane] > 0 ? square[lane] : T(0))
-                                              : state[lane];
+      s.sleep.amplitude[i * mode_lanes<T> + lane] =
+          packs(s.sleep.spread)[i][lane] > 0 ? std::sqrt(square[lane] > 0 ? square[lane] : T(0))
+                                             : state[lane];
     }
   }
 }
@@ -96,32 +97,32 @@ void measure_room(ModalState<T>& s, std::size_t places, std::size_t listeners) {
     const T* const row = listener(s, places, l);
     V loud{};
     for (std::size_t i = 0; l < places && i < pack_count(s); ++i) {
-      const V part = packs(row)[i] * packs(s.swing)[i];
-      loud += select(packs(s.spread)[i] > V{}, part * part, V{});
+      const V part = packs(row)[i] * packs(s.sleep.amplitude)[i];
+      loud += select(packs(s.sleep.spread)[i] > V{}, part * part, V{});
     }
     V owed{};
     for (std::size_t i = 0; i < all_packs(s); ++i) {
-      owed += absolute(packs(row)[i]) * packs(s.debt)[i];
+      owed += absolute(packs(row)[i]) * packs(s.sleep.debt)[i];
     }
     const T now = std::sqrt(total<T>(loud) / 2);
-    const T lately = after_check(s, s.lately_kept) * s.loudness[l];
-    s.loudness[l] = now > lately ? now : lately;
+    const T lately = after_check(s, s.sleep.lately_kept) * s.sleep.loudness[l];
+    s.sleep.loudness[l] = now > lately ? now : lately;
     // The peak without what sleeps may be less by what is missing.
-    const T share = s.silence * (1 - s.silence);
-    const T room = share * s.loudness[l] - total<T>(owed);
-    s.room[l] = room > 0 ? room : T(0);
+    const T share = s.sleep.silence * (1 - s.sleep.silence);
+    const T room = share * s.sleep.loudness[l] - total<T>(owed);
+    s.sleep.room[l] = room > 0 ? room : T(0);
   }
 }
 
 template <class T>
 bool may_sleep(ModalState<T>& s, std::size_t mode, std::size_t places, std::size_t listeners) {
   for (std::size_t l = 0; l < listeners; ++l) {
-    if (absolute(listener(s, places, l)[mode]) * s.swing[mode] > s.room[l]) {
+    if (absolute(listener(s, places, l)[mode]) * s.sleep.amplitude[mode] > s.sleep.room[l]) {
       return false;
     }
   }
   for (std::size_t l = 0; l < listeners; ++l) {
-    s.room[l] -= absolute(listener(s, places, l)[mode]) * s.swing[mode];
+    s.sleep.room[l] -= absolute(listener(s, places, l)[mode]) * s.sleep.amplitude[mode];
   }
   return true;
 }
@@ -129,26 +130,26 @@ bool may_sleep(ModalState<T>& s, std::size_t mode, std::size_t places, std::size
 template <class T>
 void stay_awake(ModalState<T>& s, std::size_t modes) {
   const std::size_t unit = 2 * mode_lanes<T>;
-  s.awake = modes;
-  s.swept = (modes + unit - 1) / unit * unit;
+  s.sleep.awake = modes;
+  s.sleep.swept = (modes + unit - 1) / unit * unit;
 }
 
 // What has decayed enough falls asleep. The modes are left alone at this time.
 template <class T>
 void check_sleep(ModalState<T>& s, std::size_t places, std::size_t listeners) {
   for (std::size_t i = 0; i < all_packs(s); ++i) {
-    packs(s.debt)[i] *= after_check(s, packs(s.decay)[i]);
+    packs(s.sleep.debt)[i] *= after_check(s, packs(s.sleep.decay)[i]);
   }
   measure_amplitudes(s);
   measure_room(s, places, listeners);
-  std::size_t awake = s.awake;
+  std::size_t awake = s.sleep.awake;
   for (; awake > 0 && may_sleep(s, awake - 1, places, listeners); --awake) {
     const std::size_t mode = awake - 1;
-    s.debt[mode] += s.swing[mode];
-    s.q[mode] = s.d[mode] = s.saved_q[mode] = s.saved_d[mode] = 0;
+    s.sleep.debt[mode] += s.sleep.amplitude[mode];
+    s.motion.q[mode] = s.motion.d[mode] = s.saved.q[mode] = s.saved.d[mode] = 0;
   }
   stay_awake(s, awake);
-  s.is_long_check = awake <= few_modes;
+  s.sleep.is_long_check = awake <= few_modes;
 }
 
 }  // namespace

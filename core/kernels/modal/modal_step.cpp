@@ -43,9 +43,9 @@ struct Player : Presser<T, Crossed> {
         }
         hold_all();
         play_bound<true>(at, frames);
-        s.is_stale = true;
-      } else if (s.silence > 0) {
-        frames = frames < s.until_check || is_held() ? frames : s.until_check;
+        s.motion.is_stale = true;
+      } else if (s.sleep.silence > 0) {
+        frames = frames < s.sleep.until_check || is_held() ? frames : s.sleep.until_check;
         play_steady(at, frames);
         settle(at + frames - 1, frames);
       } else {
@@ -57,35 +57,36 @@ struct Player : Presser<T, Crossed> {
 
   // Lets modes sleep that are neither pushed nor held after frame `last`.
   void settle(std::size_t last, std::size_t frames) {
-    s.until_check -= frames < s.until_check ? static_cast<std::uint32_t>(frames) : s.until_check;
-    if (s.until_check > 0) {
+    s.sleep.until_check -=
+        frames < s.sleep.until_check ? static_cast<std::uint32_t>(frames) : s.sleep.until_check;
+    if (s.sleep.until_check > 0) {
       return;
     }
     find_pushes(last, 1);
-    if (s.pushing == 0 && !is_held()) {
+    if (s.inputs.pushing == 0 && !is_held()) {
       check_sleep(s, places, places + outputs);
     }
-    s.until_check = s.is_long_check ? long_check_frames : check_frames;
+    s.sleep.until_check = s.sleep.is_long_check ? long_check_frames : check_frames;
   }
 
   void play_steady(std::size_t first, std::size_t frames) {
-    if (s.is_stale) {
-      mix(0, s.k, s.z);
+    if (s.motion.is_stale) {
+      mix(0, s.motion.k, s.motion.z);
       this->mix_forces();
-      s.has_bounds = !Crossed && measure_compliance(s, places);
-      if (s.silence > 0) {
+      s.ends.has_bounds = !Crossed && measure_compliance(s, places);
+      if (s.sleep.silence > 0) {
         measure_ringing(s);
       }
-      s.is_stale = false;
+      s.motion.is_stale = false;
     }
     for (std::size_t n = first; n < first + frames; ++n) {
       fill_amplitudes(n);
     }
     find_pushes(first, frames);
-    if (s.pushing > 0) {
+    if (s.inputs.pushing > 0) {
       wake();
     }
-    if (s.touched_frames > 0 || is_held() || !play_free(first, frames)) {
+    if (s.held.touched_frames > 0 || is_held() || !play_free(first, frames)) {
       play_touched(first, frames);
     }
   }
@@ -112,23 +113,23 @@ struct Player : Presser<T, Crossed> {
           break;
       }
       const bool is_late = push.by == ModalPush::By::position || push.by == ModalPush::By::late;
-      s.amplitude[frame * pushes + j] = w * (is_late ? s.late[j] : now);
-      s.late[j] = now;
+      s.inputs.amplitude[frame * pushes + j] = w * (is_late ? s.inputs.late[j] : now);
+      s.inputs.late[j] = now;
     }
   }
   bool is_silent(std::size_t push, std::size_t first, std::size_t frames) const {
     for (std::size_t n = first; n < first + frames; ++n) {
-      if (s.amplitude[n * pushes + push] != 0) {
+      if (s.inputs.amplitude[n * pushes + push] != 0) {
         return false;
       }
     }
     return true;
   }
   void find_pushes(std::size_t first, std::size_t frames) {
-    s.pushing = 0;
+    s.inputs.pushing = 0;
     for (std::uint32_t j = 0; j < pushes; ++j) {
       if (!is_silent(j, first, frames)) {
-        s.push_of[s.pushing++] = j;
+        s.inputs.push_of[s.inputs.pushing++] = j;
       }
     }
   }
@@ -139,21 +140,21 @@ struct Player : Presser<T, Crossed> {
   // the last block; if it becomes more than that, the block is played again with all.
   void play_touched(std::size_t first, std::size_t frames) {
     const T norm = greatest_norm(first, frames);
-    const T most = 2 * (norm + s.kick_norm);
-    if (s.has_bounds && s.surprised_frames == 0 && most > 0) {
+    const T most = 2 * (norm + s.ends.kick_norm);
+    if (s.ends.has_bounds && s.held.surprised_frames == 0 && most > 0) {
       hold_some(first, frames, most);
     } else {
       hold_all();
     }
-    const bool is_whole = s.held_links == s.links;
+    const bool is_whole = s.held.links == s.held.all_links;
     if (!is_whole) {
       save();
     }
     play_bound<false>(first, frames);
     const auto passed = static_cast<std::uint32_t>(frames);
-    s.surprised_frames -= passed < s.surprised_frames ? passed : s.surprised_frames;
-    if (!is_whole && !(norm + s.kick_norm <= most)) {
-      s.surprised_frames = frames_after_touch;
+    s.held.surprised_frames -= passed < s.held.surprised_frames ? passed : s.held.surprised_frames;
+    if (!is_whole && !(norm + s.ends.kick_norm <= most)) {
+      s.held.surprised_frames = frames_after_touch;
       restore();
       hold_all();
       play_bound<false>(first, frames);
@@ -166,8 +167,8 @@ struct Player : Presser<T, Crossed> {
     if (presses()) {
       this->measure_passive();
     }
-    s.shoves_later = !Moving && this->may_shove_later();
-    std::fill_n(s.shove, s.held_places, T(0));
+    s.passive.shoves_later = !Moving && this->may_shove_later();
+    std::fill_n(s.passive.shove, s.held.places, T(0));
     bool acts = false;
     for (std::size_t n = first; n < first + frames; ++n) {
       if constexpr (Moving) {
@@ -175,7 +176,7 @@ struct Player : Presser<T, Crossed> {
         if (modes.is_exact && !Crossed) {
           this->advance_exact();
         } else {
-          mix(0, s.k, s.z);
+          mix(0, s.motion.k, s.motion.z);
         }
         this->mix_forces();
         fill_amplitudes(n);
@@ -186,30 +187,30 @@ struct Player : Presser<T, Crossed> {
       if (presses()) {
         this->remember_passive();
       }
-      std::fill_n(s.exerted, places + modes.ends.size(), T(0));
-      std::fill_n(s.force + places, modes.ends.size(), T(0));
+      std::fill_n(s.ends.exerted, places + modes.ends.size(), T(0));
+      std::fill_n(s.ends.force + places, modes.ends.size(), T(0));
       move_modes(n);
       move_places();
       move_ends(n);
-      s.is_pushed = presses() && this->press();
-      acts |= act() || s.is_pushed;
+      s.passive.is_pushed = presses() && this->press();
+      acts |= act() || s.passive.is_pushed;
       hear(n);
     }
     this->shove_now();
-    s.kick_norm = 0;
+    s.ends.kick_norm = 0;
     for (std::size_t p = 0; p < places; ++p) {
-      s.kick_norm += norm_of_kicks(s.kicked[p], s.place_norm[p]);
+      s.ends.kick_norm += norm_of_kicks(s.ends.kicked[p], s.shapes.place_norm[p]);
     }
     const auto passed = static_cast<std::uint32_t>(frames);
-    s.touched_frames = acts                        ? frames_after_touch
-                       : s.touched_frames > passed ? s.touched_frames - passed
-                                                   : 0;
+    s.held.touched_frames = acts                             ? frames_after_touch
+                            : s.held.touched_frames > passed ? s.held.touched_frames - passed
+                                                             : 0;
   }
 
   void locate_places() {
     for (std::uint32_t p = 0; p < places; ++p) {
-      s.kicked[p] = 0;
-      if (s.row_of[p] != nowhere) {
+      s.ends.kicked[p] = 0;
+      if (s.held.row_of[p] != nowhere) {
         locate_at_first(p);
       }
     }
@@ -217,15 +218,16 @@ struct Player : Presser<T, Crossed> {
 
   // Crossed modes are placed a sample ahead: until then a place is where it was put.
   void locate_at_first(std::uint32_t p) {
-    if (!Crossed || *s.used != 0) {
+    if (!Crossed || *s.motion.used != 0) {
       locate(p);
     }
   }
   void locate(std::uint32_t p) {
-    const std::size_t at = p * s.row;
-    s.x[p] = static_cast<T>(modes.places[p].rest) + read<Crossed>(s, s.places + at);
-    if (Crossed || s.passives > 0) {
-      s.v[p] = Crossed ? read<Crossed>(s, s.speeds + at) : along(s, s.places + at, s.d);
+    const std::size_t at = p * s.shapes.row;
+    s.ends.x[p] = static_cast<T>(modes.places[p].rest) + read<Crossed>(s, s.shapes.places + at);
+    if (Crossed || s.passive.count > 0) {
+      s.ends.v[p] = Crossed ? read<Crossed>(s, s.shapes.speeds + at)
+                            : along(s, s.shapes.places + at, s.motion.d);
     }
   }
 
@@ -233,22 +235,22 @@ struct Player : Presser<T, Crossed> {
   template <bool Moving>
   void choose_rows() {
     if (Moving) {
-      for (s.pushing = 0; s.pushing < pushes; ++s.pushing) {
-        s.push_of[s.pushing] = static_cast<std::uint32_t>(s.pushing);
+      for (s.inputs.pushing = 0; s.inputs.pushing < pushes; ++s.inputs.pushing) {
+        s.inputs.push_of[s.inputs.pushing] = static_cast<std::uint32_t>(s.inputs.pushing);
       }
     }
     std::size_t rows = 0;
-    for (std::size_t r = 0; r < s.held_places; ++r) {
-      s.rows[rows++] = s.places + s.place_of[r] * s.row;
+    for (std::size_t r = 0; r < s.held.places; ++r) {
+      s.sweep.rows[rows++] = s.shapes.places + s.held.place_of[r] * s.shapes.row;
     }
-    for (std::size_t r = 0; r < s.pushing; ++r) {
-      s.rows[rows++] = s.pushes + s.push_of[r] * s.row;
+    for (std::size_t r = 0; r < s.inputs.pushing; ++r) {
+      s.sweep.rows[rows++] = s.shapes.pushes + s.inputs.push_of[r] * s.shapes.row;
     }
     for (std::size_t o = 0; o < outputs; ++o) {
-      s.rows[rows++] = s.outputs + o * s.row;
+      s.sweep.rows[rows++] = s.shapes.outputs + o * s.shapes.row;
     }
-    if (s.held_places + s.pushing <= most_kicked) {
-      bundle<Crossed>(s, s.held_places + s.pushing + heard_along());
+    if (s.held.places + s.inputs.pushing <= most_kicked) {
+      bundle<Crossed>(s, s.held.places + s.inputs.pushing + heard_along());
     }
   }
   // How many outputs a sweep takes along; the others have sweeps of their own.
@@ -256,72 +258,72 @@ struct Player : Presser<T, Crossed> {
 
   void move_modes(std::size_t n) {
     const T w = inverse_mass();
-    const std::size_t kicked = s.held_places + s.pushing;
+    const std::size_t kicked = s.held.places + s.inputs.pushing;
     bool acts = false;
-    for (std::size_t r = 0; r < s.held_places; ++r) {
-      const std::uint32_t p = s.place_of[r];
-      s.kick[r] = w * s.force[p];
-      acts |= s.kick[r] != 0;
-      s.kicked[p] += absolute(s.kick[r]);
+    for (std::size_t r = 0; r < s.held.places; ++r) {
+      const std::uint32_t p = s.held.place_of[r];
+      s.sweep.kick[r] = w * s.ends.force[p];
+      acts |= s.sweep.kick[r] != 0;
+      s.ends.kicked[p] += absolute(s.sweep.kick[r]);
     }
-    for (std::size_t r = 0; r < s.pushing; ++r) {
-      s.kick[s.held_places + r] = s.amplitude[n * pushes + s.push_of[r]];
+    for (std::size_t r = 0; r < s.inputs.pushing; ++r) {
+      s.sweep.kick[s.held.places + r] = s.inputs.amplitude[n * pushes + s.inputs.push_of[r]];
     }
-    if (acts && s.awake < modes.modes) {
+    if (acts && s.sleep.awake < modes.modes) {
       wake();
       if (kicked <= most_kicked) {
-        bundle<Crossed>(s, s.bundled);
+        bundle<Crossed>(s, s.sweep.bundled);
       }
     }
     if (kicked > most_kicked) {
       sweep_rows<Crossed>(s, kicked, outputs);
       return;
     }
-    if (s.shoves_later) {
-      std::copy_n(s.shove, kicked, s.kick);
+    if (s.passive.shoves_later) {
+      std::copy_n(s.passive.shove, kicked, s.sweep.kick);
       sweep_sample<Crossed, true>(s, kicked, heard_along());
     } else {
       sweep_sample<Crossed, false>(s, kicked, heard_along());
     }
     for (std::size_t o = heard_along(); o < outputs; ++o) {
-      s.heard[o] = read<Crossed>(s, s.outputs + o * s.row);
+      s.sweep.heard[o] = read<Crossed>(s, s.shapes.outputs + o * s.shapes.row);
     }
   }
 
   void move_places() {
-    for (std::size_t r = 0; r < s.held_places; ++r) {
-      const std::uint32_t p = s.place_of[r];
-      s.v[p] = s.speed[r];
-      s.x[p] += s.speed[r];
-      if (Crossed && s.is_first) {
+    for (std::size_t r = 0; r < s.held.places; ++r) {
+      const std::uint32_t p = s.held.place_of[r];
+      s.ends.v[p] = s.sweep.speed[r];
+      s.ends.x[p] += s.sweep.speed[r];
+      if (Crossed && s.motion.is_first) {
         locate(p);
       }
-      s.force[p] = 0;
+      s.ends.force[p] = 0;
     }
   }
 
   // The plain links that are not linear; whether any acts.
   bool act() {
     bool acts = false;
-    const Ends* ends = s.held_ends;
-    const T* give = s.held_give;
+    const Ends* ends = s.held.ends;
+    const T* give = s.held.give;
     for (std::size_t h = 0; h < modes.holds.size(); ++h) {
-      if (s.held[h] == 0) {
+      if (s.held.count_of[h] == 0) {
         continue;
       }
       const LinkRun& run = program.link_runs[modes.holds[h].run];
       const auto c = [&](std::size_t i) { return coefficient(run.coefficients[i]); };
       with_law<T>(run.law, c, [&](const auto& law) {
-        for (std::size_t i = 0; i < s.held[h]; ++i, ++ends, ++give) {
+        for (std::size_t i = 0; i < s.held.count_of[h]; ++i, ++ends, ++give) {
           const auto [a, b] = *ends;
-          const T d = s.x[a] - s.x[b];
-          T f = law.force(d, s.v[a] - s.v[b]);
+          const T d = s.ends.x[a] - s.ends.x[b];
+          T f = law.force(d, s.ends.v[a] - s.ends.v[b]);
           if (*give > 0) {
             f *= share_of_give(law, d, *give / coefficient(modes.give_by));
           }
           acts |= f != 0;
-          s.force[a] -= f;
-          s.force[b] += f;
+          s.ends.force[a] -= f;
+          s.ends.force[b] += f;
         }
       });
     }
@@ -337,16 +339,17 @@ struct Player : Presser<T, Crossed> {
         continue;
       }
       block.outputs[n * outputs + o] = output.is_place
-                                           ? static_cast<T>(output.place.rest) + s.heard[o]
+                                           ? static_cast<T>(output.place.rest) + s.sweep.heard[o]
                                            : position_of(output.end, n);
     }
   }
 
   // What links and inputs exert at a node, once all has moved and pulled.
   T force_of(const ModalForce& force, std::size_t number, std::size_t n) const {
-    const T* const row = s.felt + 2 * number * s.stride;
-    T sum = s.felt_still[number] +
-            (Crossed ? read<Crossed>(s, row) : along(s, row, s.q) + along(s, row + s.stride, s.d));
+    const T* const row = s.forces.rows + 2 * number * s.shapes.stride;
+    T sum = s.forces.still[number] +
+            (Crossed ? read<Crossed>(s, row)
+                     : along(s, row, s.motion.q) + along(s, row + s.shapes.stride, s.motion.d));
     const T* const value = block.value + n * inputs;
     const T* const velocity = block.velocity + n * inputs;
     for (const ModalForce::Hand& hand : force.hands) {
@@ -358,7 +361,7 @@ struct Player : Presser<T, Crossed> {
       sum += static_cast<T>(input.weight) * value[input.of];
     }
     for (const ModalForce::Weight& end : force.ends) {
-      sum += static_cast<T>(end.weight) * (s.force[end.of] + s.exerted[end.of]);
+      sum += static_cast<T>(end.weight) * (s.ends.force[end.of] + s.ends.exerted[end.of]);
     }
     return static_cast<T>(force.scale) * sum;
   }
@@ -370,11 +373,11 @@ struct Player : Presser<T, Crossed> {
     std::size_t rows = 0;
     for (std::size_t o = 0; o < outputs; ++o) {
       if (modes.outputs[o].is_place) {
-        s.rows[rows++] = s.outputs + o * s.row;
+        s.sweep.rows[rows++] = s.shapes.outputs + o * s.shapes.row;
       }
     }
     const std::size_t heard = rows;
-    if (s.forces > 0 || s.pushing > 2 ||
+    if (s.forces.count > 0 || s.inputs.pushing > 2 ||
         (!modes.holds.empty() && !find_suspects(first, frames, rows)) || rows > most_heard) {
       return false;
     }
@@ -388,14 +391,14 @@ struct Player : Presser<T, Crossed> {
     }
     write_outputs(first, frames);
     move_ends(first + frames - 1);
-    s.pulls = true;
+    s.passive.pulls = true;
     return true;
   }
 
   // Adds the places to the rows whose links may act. False where one acts for sure.
   bool find_suspects(std::size_t first, std::size_t frames, std::size_t& rows) {
     for (std::size_t p = 0; p < places; ++p) {
-      s.row_of[p] = nowhere;
+      s.held.row_of[p] = nowhere;
     }
     const T norm = greatest_norm(first, frames);
     for (const ModalHold& hold : modes.holds) {
@@ -414,9 +417,9 @@ struct Player : Presser<T, Crossed> {
     return true;
   }
   void suspect(std::uint32_t end, std::size_t& rows) {
-    if (end < places && s.row_of[end] == nowhere) {
-      s.row_of[end] = static_cast<std::uint32_t>(rows);
-      s.rows[rows++] = s.places + end * s.row;
+    if (end < places && s.held.row_of[end] == nowhere) {
+      s.held.row_of[end] = static_cast<std::uint32_t>(rows);
+      s.sweep.rows[rows++] = s.shapes.places + end * s.shapes.row;
       locate_at_first(end);
     }
   }
@@ -424,12 +427,12 @@ struct Player : Presser<T, Crossed> {
   // After a free motion: whether it met no link.
   bool is_untouched(std::size_t first, std::size_t frames) const {
     const auto is_seen = [&](std::uint32_t end) {
-      return end >= places || s.row_of[end] != nowhere;
+      return end >= places || s.held.row_of[end] != nowhere;
     };
     const auto position = [&](std::uint32_t end, std::size_t n) {
       return end >= places ? position_of(end, first + n)
                            : static_cast<T>(modes.places[end].rest) +
-                                 s.seen[s.row_of[end] * max_block_frames + n];
+                                 s.sweep.seen[s.held.row_of[end] * max_block_frames + n];
     };
     for (const ModalHold& hold : modes.holds) {
       for (std::size_t i = 0; i < hold.a.size(); ++i) {
@@ -442,9 +445,9 @@ struct Player : Presser<T, Crossed> {
         const T first_apart = position(a, 0) - position(b, 0);
         Range<T> d{first_apart, first_apart};
         if (run.scheme != Scheme::plain) {
-          const T now = s.x[a] - s.x[b];
+          const T now = s.ends.x[a] - s.ends.x[b];
           d.take(now);
-          d.take(now - (s.v[a] - s.v[b]));
+          d.take(now - (s.ends.v[a] - s.ends.v[b]));
         }
         for (std::size_t n = 1; n < frames; ++n) {
           d.take(position(a, n) - position(b, n));
@@ -458,7 +461,7 @@ struct Player : Presser<T, Crossed> {
   }
 
   void run_modes(std::size_t first, std::size_t frames, std::size_t rows) {
-    switch (s.pushing) {
+    switch (s.inputs.pushing) {
       case 0:
         return run_heard<0>(first, frames, rows);
       case 1:
@@ -483,10 +486,10 @@ struct Player : Presser<T, Crossed> {
   template <std::size_t Samples, std::size_t Kicked, std::size_t Heard>
   void run(std::size_t first, std::size_t frames, std::size_t rows) {
     for (std::size_t r = Heard; r-- > 0;) {
-      s.rows[Kicked + r] = r < rows ? s.rows[r] : nullptr;
+      s.sweep.rows[Kicked + r] = r < rows ? s.sweep.rows[r] : nullptr;
     }
     for (std::size_t r = 0; r < Kicked; ++r) {
-      s.rows[r] = s.pushes + s.push_of[r] * s.row;
+      s.sweep.rows[r] = s.shapes.pushes + s.inputs.push_of[r] * s.shapes.row;
     }
     bundle<Crossed>(s, Kicked + Heard);
     std::size_t n = 0;
@@ -501,13 +504,14 @@ struct Player : Presser<T, Crossed> {
   void run_samples(std::size_t first, std::size_t n, std::size_t rows) {
     for (std::size_t m = 0; m < Samples; ++m) {
       for (std::size_t r = 0; r < Kicked; ++r) {
-        s.kick[m * Kicked + r] = s.amplitude[(first + n + m) * pushes + s.push_of[r]];
+        s.sweep.kick[m * Kicked + r] =
+            s.inputs.amplitude[(first + n + m) * pushes + s.inputs.push_of[r]];
       }
     }
     sweep<Samples, Kicked, false, Heard, Crossed, false>(s);
     for (std::size_t m = 0; m < Samples; ++m) {
       for (std::size_t r = 0; r < rows; ++r) {
-        s.seen[r * max_block_frames + n + m] = s.heard[m * Heard + r];
+        s.sweep.seen[r * max_block_frames + n + m] = s.sweep.heard[m * Heard + r];
       }
     }
   }
@@ -517,7 +521,7 @@ struct Player : Presser<T, Crossed> {
     for (std::size_t o = 0; o < outputs; ++o) {
       const ModalOutput& output = modes.outputs[o];
       T* out = block.outputs + first * outputs + o;
-      const T* const seen = s.seen + row * max_block_frames;
+      const T* const seen = s.sweep.seen + row * max_block_frames;
       const T rest = static_cast<T>(output.place.rest);
       for (std::size_t n = 0; n < frames; ++n, out += outputs) {
         *out = output.is_place ? rest + seen[n] : position_of(output.end, first + n);

@@ -72,10 +72,10 @@ bool find_straight(const PassiveLink& passive, const laws::LinkState<T>& state,
 template <class T>
 struct StraightMatrices {
   explicit StraightMatrices(const ModalState<T>& s)
-      : count(s.active->links.size()),
+      : count(s.passive.active->links.size()),
         packs((count + mode_lanes<T> - 1) / mode_lanes<T>),
         stride(packs * mode_lanes<T>),
-        coupling(s.straight),
+        coupling(s.passive.straight),
         inverse(coupling + count * stride),
         slope(inverse + count * stride) {}
 
@@ -101,7 +101,7 @@ struct StraightMatrices {
 template <class T, class Body>
 void invert_straight(ModalState<T>& s, const StraightMatrices<T>& m, const StraightLink<T>* links,
                      const Body& body) {
-  const std::vector<PassiveLink>& active = s.active->links;
+  const std::vector<PassiveLink>& active = s.passive.active->links;
   std::fill_n(m.coupling, 2 * m.count * m.stride, T(0));
   for (std::size_t i = 0; i < m.count; ++i) {
     m.slope[i] = links[i].slope;
@@ -127,23 +127,23 @@ void invert_straight(ModalState<T>& s, const StraightMatrices<T>& m, const Strai
       }
     }
   }
-  s.is_straight_stale = false;
+  s.passive.is_straight_stale = false;
 }
 
-// Fills s.pushed. False where it is not so simple: nothing has happened.
+// Fills s.passive.pushed. False where it is not so simple: nothing has happened.
 template <class T, class Body>
 bool push_straight(ModalState<T>& s, const Body& body) {
-  const std::vector<PassiveLink>& active = s.active->links;
+  const std::vector<PassiveLink>& active = s.passive.active->links;
   const std::size_t count = active.size();
-  if (!s.pulls || count < 2 || count > most_straight) {
+  if (!s.passive.pulls || count < 2 || count > most_straight) {
     return false;
   }
   const StraightMatrices<T> matrices(s);
   StraightLink<T> links[most_straight];
   T wanted[most_straight];
-  bool is_same = !s.is_straight_stale;
+  bool is_same = !s.passive.is_straight_stale;
   for (std::size_t i = 0; i < count; ++i) {
-    const T* const row = s.memory + i * passive_rows;
+    const T* const row = s.passive.memory + i * passive_rows;
     const laws::LinkState<T> state{
         .now = row[0], .speed = row[1], .free = body.distance(active[i].ends)};
     if (!find_straight(active[i], state, s.ramps.value, links[i])) {
@@ -175,7 +175,7 @@ bool push_straight(ModalState<T>& s, const Body& body) {
     return false;
   }
   for (std::size_t i = 0; i < count; ++i) {
-    s.pushed[active[i].ends.a] = force[i];
+    s.passive.pushed[active[i].ends.a] = force[i];
   }
   return true;
 }

@@ -31,11 +31,11 @@ const ModePack<T>* packs(const T* numbers) {
 }
 template <class T>
 std::size_t pack_count(const ModalState<T>& s) {
-  return s.swept / mode_lanes<T>;
+  return s.sleep.swept / mode_lanes<T>;
 }
 template <class T>
 std::size_t all_packs(const ModalState<T>& s) {
-  return s.modes / mode_lanes<T>;
+  return s.shapes.modes / mode_lanes<T>;
 }
 
 // By halves: one lane after the other would take as long as the rest of a short sweep.
@@ -65,8 +65,8 @@ T along(const ModalState<T>& s, const T* row, const T* numbers) {
 // Where a row's place is, or what moves like one: of crossed modes the real part of a product.
 template <bool Crossed, class T>
 T read(const ModalState<T>& s, const T* row) {
-  const T even = along(s, row, s.q);
-  return Crossed ? even - along(s, row + s.stride, s.d) : even;
+  const T even = along(s, row, s.motion.q);
+  return Crossed ? even - along(s, row + s.shapes.stride, s.motion.d) : even;
 }
 
 // How far a push of 1 along one row moves what another reads.
@@ -76,7 +76,7 @@ T reply(const ModalState<T>& s, const T* one, const T* other) {
   for (std::size_t i = 0; i < all_packs(s); ++i) {
     sum += packs(one)[i] * packs(other)[i];
     if constexpr (Crossed) {
-      sum -= packs(one + s.stride)[i] * packs(other + s.stride)[i];
+      sum -= packs(one + s.shapes.stride)[i] * packs(other + s.shapes.stride)[i];
     }
   }
   return total<T>(sum);
@@ -93,47 +93,48 @@ void keep(const ModalState<T>& s, T* to, const T* from) {
 // zeros.
 template <bool Crossed, class T>
 void bundle(ModalState<T>& s, std::size_t rows) {
-  bool is_same = rows == s.bundled && s.swept <= s.bundled_modes;
+  bool is_same = rows == s.sweep.bundled && s.sleep.swept <= s.sweep.bundled_modes;
   for (std::size_t r = 0; r < rows && is_same; ++r) {
-    is_same = s.rows[r] == s.bundled_rows[r];
+    is_same = s.sweep.rows[r] == s.sweep.bundled_rows[r];
   }
   if (is_same) {
     return;
   }
-  s.bundled = rows;
-  s.bundled_modes = s.swept;
+  s.sweep.bundled = rows;
+  s.sweep.bundled_modes = s.sleep.swept;
   for (std::size_t r = 0; r < rows; ++r) {
-    s.bundled_rows[r] = s.rows[r];
+    s.sweep.bundled_rows[r] = s.sweep.rows[r];
     for (std::size_t part = 0; part < parts<Crossed>; ++part) {
-      const T* const row = s.rows[r] == nullptr ? nullptr : s.rows[r] + part * s.stride;
+      const T* const row =
+          s.sweep.rows[r] == nullptr ? nullptr : s.sweep.rows[r] + part * s.shapes.stride;
       for (std::size_t i = 0; i < pack_count(s); ++i) {
-        packs(s.bundle)[(i * rows + r) * parts<Crossed> + part] =
+        packs(s.sweep.bundle)[(i * rows + r) * parts<Crossed> + part] =
             row == nullptr ? ModePack<T>{} : packs(row)[i];
       }
     }
   }
 }
 
-// All modes through a few samples. Of the bundled rows the first are kicked by s.kick [sample][row]
-// and, if Felt, give their speed to s.speed [row], of one sample; the others give their position
-// to s.heard [sample][row]. If Shoved, the kicks are those by which passive links have moved the
-// modes at the end of the sample before.
+// All modes through a few samples. Of the bundled rows the first are kicked by s.sweep.kick
+// [sample][row] and, if Felt, give their speed to s.sweep.speed [row], of one sample; the others
+// give their position to s.sweep.heard [sample][row]. If Shoved, the kicks are those by which
+// passive links have moved the modes at the end of the sample before.
 template <std::size_t Samples, std::size_t Kicked, bool Felt, std::size_t Heard, bool Crossed,
           bool Shoved, class T>
 void sweep(ModalState<T>& s) {
   using V = ModePack<T>;
   constexpr std::size_t width = parts<Crossed>;
-  V* const q = packs(s.q);
-  V* const d = packs(s.d);
-  const V* const k = packs(s.k);
-  const V* const z = packs(s.z);
-  const V* row = packs(s.bundle);
+  V* const q = packs(s.motion.q);
+  V* const d = packs(s.motion.d);
+  const V* const k = packs(s.motion.k);
+  const V* const z = packs(s.motion.z);
+  const V* row = packs(s.sweep.bundle);
   V kick[Samples * Kicked + 1];
   V speed[Kicked + 1];
   V heard[Samples * Heard + 1];
 #pragma GCC unroll 16
   for (std::size_t r = 0; r < Samples * Kicked; ++r) {
-    kick[r] = V{} + s.kick[r];
+    kick[r] = V{} + s.sweep.kick[r];
   }
 #pragma GCC unroll 16
   for (std::size_t r = 0; r < Kicked; ++r) {
@@ -207,11 +208,11 @@ void sweep(ModalState<T>& s) {
   }
 #pragma GCC unroll 16
   for (std::size_t r = 0; r < Kicked && Felt; ++r) {
-    s.speed[r] = total<T>(speed[r]);
+    s.sweep.speed[r] = total<T>(speed[r]);
   }
 #pragma GCC unroll 16
   for (std::size_t r = 0; r < Samples * Heard; ++r) {
-    s.heard[r] = total<T>(heard[r]);
+    s.sweep.heard[r] = total<T>(heard[r]);
   }
 }
 
@@ -258,7 +259,8 @@ void kick_row(const ModalState<T>& s, T* load, const T* row, T kick) {
     packs(load)[i] += kick * packs(row)[i];
   }
 }
-// Adds s.shove along some rows of places to the modes; what is beyond the last adds nothing.
+// Adds s.passive.shove along some rows of places to the modes; what is beyond the last adds
+// nothing.
 template <bool Crossed, std::size_t Rows, class T>
 void shove_some(ModalState<T>& s, std::size_t first) {
   using V = ModePack<T>;
@@ -266,9 +268,9 @@ void shove_some(ModalState<T>& s, std::size_t first) {
   V shove[Rows];
 #pragma GCC unroll 16
   for (std::size_t r = 0; r < Rows; ++r) {
-    const bool is_there = first + r < s.held_places;
-    row[r] = s.rows[is_there ? first + r : first];
-    shove[r] = V{} + (is_there ? s.shove[first + r] : T(0));
+    const bool is_there = first + r < s.held.places;
+    row[r] = s.sweep.rows[is_there ? first + r : first];
+    shove[r] = V{} + (is_there ? s.passive.shove[first + r] : T(0));
   }
   for (std::size_t i = 0; i < pack_count(s); ++i) {
     V q{};
@@ -277,17 +279,17 @@ void shove_some(ModalState<T>& s, std::size_t first) {
     for (std::size_t r = 0; r < Rows; ++r) {
       q += shove[r] * packs(row[r])[i];
       if constexpr (Crossed) {
-        d += shove[r] * packs(row[r] + s.stride)[i];
+        d += shove[r] * packs(row[r] + s.shapes.stride)[i];
       }
     }
-    packs(s.q)[i] += q;
-    packs(s.d)[i] += Crossed ? d : q;
+    packs(s.motion.q)[i] += q;
+    packs(s.motion.d)[i] += Crossed ? d : q;
   }
 }
 template <bool Crossed, class T>
 void shove_rows(ModalState<T>& s) {
-  for (std::size_t row = 0; row < s.held_places; row += most_shoved) {
-    if (row + 1 == s.held_places) {
+  for (std::size_t row = 0; row < s.held.places; row += most_shoved) {
+    if (row + 1 == s.held.places) {
       shove_some<Crossed, 1>(s, row);
     } else {
       shove_some<Crossed, most_shoved>(s, row);
@@ -296,12 +298,12 @@ void shove_rows(ModalState<T>& s) {
 }
 template <bool Crossed, class T>
 void sweep_rows(ModalState<T>& s, std::size_t kicked, std::size_t heard) {
-  T* const load[2] = {s.load, s.load + s.stride};
+  T* const load[2] = {s.sweep.load, s.sweep.load + s.shapes.stride};
   for (std::size_t i = 0; i < pack_count(s); ++i) {
-    const auto k = packs(s.k)[i];
-    const auto z = packs(s.z)[i];
-    const auto q = packs(s.q)[i];
-    const auto d = packs(s.d)[i];
+    const auto k = packs(s.motion.k)[i];
+    const auto z = packs(s.motion.z)[i];
+    const auto q = packs(s.motion.q)[i];
+    const auto d = packs(s.motion.d)[i];
     packs(load[0])[i] = Crossed ? k * q - z * d : -(k * q + z * d);
     if constexpr (Crossed) {
       packs(load[1])[i] = k * d + z * q;
@@ -309,24 +311,25 @@ void sweep_rows(ModalState<T>& s, std::size_t kicked, std::size_t heard) {
   }
   for (std::size_t r = 0; r < kicked; ++r) {
     for (std::size_t part = 0; part < parts<Crossed>; ++part) {
-      kick_row(s, load[part], s.rows[r] + part * s.stride, s.kick[r]);
+      kick_row(s, load[part], s.sweep.rows[r] + part * s.shapes.stride, s.sweep.kick[r]);
     }
   }
   for (std::size_t i = 0; i < pack_count(s); ++i) {
     if constexpr (Crossed) {
-      packs(s.q)[i] += packs(load[0])[i];
-      packs(s.d)[i] += packs(load[1])[i];
+      packs(s.motion.q)[i] += packs(load[0])[i];
+      packs(s.motion.d)[i] += packs(load[1])[i];
     } else {
-      packs(s.d)[i] += packs(load[0])[i];
-      packs(s.q)[i] += packs(s.d)[i];
+      packs(s.motion.d)[i] += packs(load[0])[i];
+      packs(s.motion.q)[i] += packs(s.motion.d)[i];
     }
   }
   for (std::size_t r = 0; r < kicked; ++r) {
-    s.speed[r] = Crossed ? along(s, s.rows[r], load[0]) - along(s, s.rows[r] + s.stride, load[1])
-                         : along(s, s.rows[r], s.d);
+    s.sweep.speed[r] = Crossed ? along(s, s.sweep.rows[r], load[0]) -
+                                     along(s, s.sweep.rows[r] + s.shapes.stride, load[1])
+                               : along(s, s.sweep.rows[r], s.motion.d);
   }
   for (std::size_t r = 0; r < heard; ++r) {
-    s.heard[r] = read<Crossed>(s, s.rows[kicked + r]);
+    s.sweep.heard[r] = read<Crossed>(s, s.sweep.rows[kicked + r]);
   }
 }
 

@@ -22,6 +22,7 @@
 #include "core/compile/compile.h"
 #include "core/compile/make_engine.h"
 #include "core/kernels/domains/kernel_task.h"
+#include "core/kernels/domains/sharded_form.h"
 #include "core/kernels/registry.h"
 #include "tests/support/harness.h"
 #include "tests/support/heap.h"
