@@ -8,7 +8,7 @@
 // 4 - lK - 2 lZ > 0. So with that, too, no link gains energy.
 #pragma once
 
-#include "core/kernels/modal/modal_hold.h"
+#include "core/kernels/modal/modal_sleep.h"
 #include "core/kernels/modal/modal_straight.h"
 #include "core/kernels/passive/passive.h"
 
@@ -75,122 +75,6 @@ struct ModalBody {
 
   ModalState<T>& s;
   T w;
-};
-
-template <class T, bool Crossed>
-struct Presser : Holder<T, Crossed> {
-  using Base = Holder<T, Crossed>;
-  using Base::modes;
-  using Base::outputs;
-  using Base::places;
-  using Base::s;
-
-  bool presses() const { return !s.passive.active->links.empty(); }
-
-  // Whether what passive links push may wait for the next sample's sweep: where that kicks nothing
-  // else, and nobody looks at the modes before.
-  bool may_shove_later() const {
-    const bool is_all = std::all_of(s.held.count_of, s.held.count_of + modes.holds.size(),
-                                    [](std::uint32_t plain) { return plain == 0; });
-    return presses() && is_all && s.inputs.pushing == 0 && s.forces.count == 0 &&
-           s.held.places <= most_kicked;
-  }
-  // What has waited.
-  void shove_now() {
-    if (std::exchange(s.passive.shoves_later, false)) {
-      shove_rows<Crossed>(s);
-    }
-  }
-
-  // As a run of samples begins, or in each whose coefficients move.
-  void measure_passive() {
-    if (s.passive.is_reply_stale) {
-      measure_replies<Crossed>(s, places, outputs);
-      s.passive.is_reply_stale = false;
-    }
-    s.passive.is_straight_stale = true;
-    for (std::size_t i = 0; i < s.passive.count; ++i) {
-      s.passive.slack[i] =
-          s.passive.give[i] > 0 ? s.passive.give[i] / this->coefficient(modes.give_by) : T(0);
-    }
-  }
-
-  void remember_passive() {
-    remember(*s.passive.active, s.passive.memory, ModalBody<T>{s, this->inverse_mass()});
-  }
-
-  // Once everything else has moved: finds what the links push with, and moves places, what is heard
-  // and the modes. Gives whether any pushes.
-  bool press() {
-    const T w = this->inverse_mass();
-    T* row = s.passive.memory;
-    for (const PassiveLink& link : s.passive.active->links) {
-      const std::uint32_t i = link.ends.a;
-      const auto [a, b] = s.passive.links[i].ends;
-      s.passive.opening[i] = s.ends.x[a] - s.ends.x[b];
-      s.passive.rush[i] = s.ends.v[a] - s.ends.v[b] - s.passive.yield[i];
-      row[2] = s.passive.pushed[i];  // where looking for it begins
-      row += passive_rows;
-    }
-    ModalBody<T> body{s, w};
-    if (!push_straight(s, body)) {
-      correct(*s.passive.active, s.passive.memory, s.passive.numbers, body);
-    }
-    s.passive.pulls = true;
-    std::fill_n(s.passive.shove, s.held.places, T(0));
-    bool pushes = false;
-    for (const PassiveLink& link : s.passive.active->links) {
-      const std::uint32_t i = link.ends.a;
-      const T force = s.passive.pushed[i];
-      s.passive.yield_step[i] = -s.passive.yield[i] - s.passive.slack[i] * force;
-      s.passive.yield[i] = -s.passive.slack[i] * force;
-      pushes |= force != 0;
-      shove(s.passive.links[i].ends.a, -force);
-      shove(s.passive.links[i].ends.b, force);
-    }
-    for (std::size_t r = 0; pushes && r < s.held.places; ++r) {
-      const T way = moved(s.held.place_of[r]);
-      s.ends.x[s.held.place_of[r]] -= way;
-      s.ends.v[s.held.place_of[r]] -= way;
-    }
-    for (std::size_t o = 0; pushes && o < outputs; ++o) {
-      s.sweep.heard[o] -= moved(places + o);
-    }
-    if (pushes) {
-      move_by_shoves();
-    }
-    return pushes;
-  }
-
- private:
-  // How far all pushes move a listener.
-  T moved(std::size_t listener) const {
-    T sum = 0;
-    for (const PassiveLink& link : s.passive.active->links) {
-      sum +=
-          s.passive.reply[listener * s.passive.count + link.ends.a] * s.passive.pushed[link.ends.a];
-    }
-    return this->inverse_mass() * sum;
-  }
-  void shove(std::uint32_t end, T force) {
-    s.ends.exerted[end] += force;
-    if (end < places) {
-      const T kick = this->inverse_mass() * force;
-      s.passive.shove[s.held.row_of[end]] += kick;
-      s.ends.kicked[end] += absolute(kick);
-    }
-  }
-  void move_by_shoves() {
-    if (s.sleep.awake < modes.modes) {
-      this->wake();
-      if (s.held.places + s.inputs.pushing <= most_kicked) {
-        bundle<Crossed>(s, s.sweep.bundled);
-      }
-    }
-    if (!s.passive.shoves_later) {
-      shove_rows<Crossed>(s);
-    }
-  }
 };
 
 }  // namespace

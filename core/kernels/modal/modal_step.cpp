@@ -1,45 +1,37 @@
 // The modal kernel's way through a block, compiled for each instruction set.
+#include "core/kernels/modal/modal_bounds.h"
+#include "core/kernels/modal/modal_exact.h"
 #include "core/kernels/modal/modal_passive.h"
+#include "core/kernels/modal/modal_sleep.h"
+#include "core/laws/laws.h"
 
 namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
+constexpr std::uint32_t frames_after_touch = 256;  // until a free motion is tried again
+constexpr std::uint32_t nowhere = 0xffffffffu;
+
 template <class T, bool Crossed>
-struct Player : Presser<T, Crossed> {
-  using Base = Presser<T, Crossed>;
-  using Base::block;
-  using Base::coefficient;
-  using Base::greatest_norm;
-  using Base::hold_all;
-  using Base::hold_some;
-  using Base::inputs;
-  using Base::inverse_mass;
-  using Base::is_held;
-  using Base::may_act_within;
-  using Base::mix;
-  using Base::modes;
-  using Base::move_ends;
-  using Base::outputs;
-  using Base::places;
-  using Base::position_of;
-  using Base::presses;
-  using Base::program;
-  using Base::pushes;
-  using Base::restore;
-  using Base::s;
-  using Base::save;
-  using Base::wake;
+struct ModalPlayer {
+  const Modes& modes;
+  ModalState<T>& s;
+  const Program& program;
+  const Block<T>& block;
+  const std::size_t places = modes.places.size();
+  const std::size_t pushes = modes.pushes.size();
+  const std::size_t outputs = modes.outputs.size();
+  const std::size_t inputs = program.inputs.size();
 
   // Parts in which every sample moves the coefficients, or none does.
   void play() {
     for (std::size_t at = 0; at < block.frames;) {
       const std::size_t left = block.frames - at;
-      const std::size_t moving = this->moving_frames();
+      const std::size_t moving = moving_frames();
       std::size_t frames = moving > 0 && moving < left ? moving : left;
       if (moving > 0) {
         wake();
         if (modes.is_exact && !Crossed) {
-          frames = this->begin_exact(frames);
+          frames = begin_exact(frames);
         }
         hold_all();
         play_bound<true>(at, frames);
@@ -72,7 +64,7 @@ struct Player : Presser<T, Crossed> {
   void play_steady(std::size_t first, std::size_t frames) {
     if (s.motion.is_stale) {
       mix(0, s.motion.k, s.motion.z);
-      this->mix_forces();
+      mix_forces();
       s.ends.has_bounds = !Crossed && measure_compliance(s, places);
       if (s.sleep.silence > 0) {
         measure_ringing(s);
@@ -165,38 +157,38 @@ struct Player : Presser<T, Crossed> {
     locate_places();
     choose_rows<Moving>();
     if (presses()) {
-      this->measure_passive();
+      measure_passive();
     }
-    s.passive.shoves_later = !Moving && this->may_shove_later();
+    s.passive.shoves_later = !Moving && may_shove_later();
     std::fill_n(s.passive.shove, s.held.places, T(0));
     bool acts = false;
     for (std::size_t n = first; n < first + frames; ++n) {
       if constexpr (Moving) {
         advance(s.ramps);
         if (modes.is_exact && !Crossed) {
-          this->advance_exact();
+          advance_exact();
         } else {
           mix(0, s.motion.k, s.motion.z);
         }
-        this->mix_forces();
+        mix_forces();
         fill_amplitudes(n);
         if (presses()) {
-          this->measure_passive();
+          measure_passive();
         }
       }
       if (presses()) {
-        this->remember_passive();
+        remember_passive();
       }
       std::fill_n(s.ends.exerted, places + modes.ends.size(), T(0));
       std::fill_n(s.ends.force + places, modes.ends.size(), T(0));
       move_modes(n);
       move_places();
       move_ends(n);
-      s.passive.is_pushed = presses() && this->press();
+      s.passive.is_pushed = presses() && press();
       acts |= act() || s.passive.is_pushed;
       hear(n);
     }
-    this->shove_now();
+    shove_now();
     s.ends.kick_norm = 0;
     for (std::size_t p = 0; p < places; ++p) {
       s.ends.kick_norm += norm_of_kicks(s.ends.kicked[p], s.shapes.place_norm[p]);
@@ -529,11 +521,407 @@ struct Player : Presser<T, Crossed> {
       row += output.is_place;
     }
   }
+
+  // --- links
+  // ---------------------------------------------------------------------------------------
+
+  void wake() {
+    if (s.sleep.awake < modes.modes) {
+      stay_awake(s, modes.modes);
+      s.sleep.until_check = check_frames;
+      s.sleep.is_long_check = false;
+    }
+  }
+  // Whether a link has pulled in the last sample.
+  bool is_held() const {
+    for (std::size_t p = 0; p < places; ++p) {
+      if (s.ends.force[p] != 0) {
+        return true;
+      }
+    }
+    return s.passive.is_pushed;
+  }
+
+  // --- where things can be --------------------------------------------------------------------
+
+  T position_of(std::uint32_t end, std::size_t n) const {
+    const ModalEnd& other = modes.ends[end - places];
+    return other.follows ? block.value[n * inputs + other.input]
+                         : static_cast<T>(program.position[other.node]);
+  }
+
+  // What is no mass takes its place.
+  void move_ends(std::size_t n) {
+    for (std::size_t i = 0; i < modes.ends.size(); ++i) {
+      if (modes.ends[i].follows) {
+        s.ends.x[places + i] = block.value[n * inputs + modes.ends[i].input];
+        s.ends.v[places + i] = block.velocity[n * inputs + modes.ends[i].input];
+      }
+    }
+  }
+
+  // The norm that the modes have at most in this block, without what links do.
+  T greatest_norm(std::size_t first, std::size_t frames) const {
+    T norm = std::sqrt(energy(s));
+    for (std::size_t j = 0; j < pushes; ++j) {
+      T sum = 0;
+      for (std::size_t n = first; n < first + frames; ++n) {
+        sum += absolute(s.inputs.amplitude[n * pushes + j]);
+      }
+      norm += norm_of_kicks(sum, s.shapes.push_norm[j]);
+    }
+    return norm;
+  }
+
+  // Where an end can be in a block, and in the two samples before it.
+  Range<T> range_of(std::uint32_t end, std::size_t first, std::size_t frames, T norm) const {
+    if (end < places) {
+      const T reach = T(1.001) * norm * std::sqrt(s.ends.compliance[end]);
+      const T rest = static_cast<T>(modes.places[end].rest);
+      return {rest - reach, rest + reach};
+    }
+    Range<T> range{s.ends.x[end], s.ends.x[end]};
+    range.take(s.ends.x[end] - s.ends.v[end]);
+    for (std::size_t n = first; n < first + frames && modes.ends[end - places].follows; ++n) {
+      range.take(position_of(end, n));
+    }
+    return range;
+  }
+  bool may_act_within(const LinkRun& run, std::uint32_t a, std::uint32_t b, std::size_t first,
+                      std::size_t frames, T norm) const {
+    if (!s.ends.has_bounds) {
+      return true;
+    }
+    const Range<T> at = range_of(a, first, frames, norm);
+    const Range<T> to = range_of(b, first, frames, norm);
+    return may_act<T>(run, s.ramps.value, {at.low - to.high, at.high - to.low});
+  }
+
+  // --- what is computed -----------------------------------------------------------------------
+
+  // Everything that a block may change, but for what is counted.
+  void save() {
+    s.saved.awake = s.sleep.awake;
+    keep(s, s.saved.q, s.motion.q);
+    keep(s, s.saved.d, s.motion.d);
+    std::copy_n(s.ends.force, places, s.saved.force);
+    std::copy_n(s.ends.x, places + modes.ends.size(), s.saved.x);
+    std::copy_n(s.ends.v, places + modes.ends.size(), s.saved.v);
+    std::copy_n(s.passive.yield, s.passive.count, s.saved.yield);
+    std::copy_n(s.passive.yield_step, s.passive.count, s.saved.yield_step);
+    s.saved.pulls = s.passive.pulls;
+  }
+  void restore() {
+    keep(s, s.motion.q, s.saved.q);
+    keep(s, s.motion.d, s.saved.d);
+    stay_awake(s, s.saved.awake);
+    std::copy_n(s.saved.force, places, s.ends.force);
+    std::copy_n(s.saved.x, places + modes.ends.size(), s.ends.x);
+    std::copy_n(s.saved.v, places + modes.ends.size(), s.ends.v);
+    std::copy_n(s.saved.yield, s.passive.count, s.passive.yield);
+    std::copy_n(s.saved.yield_step, s.passive.count, s.passive.yield_step);
+    s.passive.pulls = s.saved.pulls;
+  }
+
+  void hold_all() {
+    hold_if([](const LinkRun&, std::uint32_t, std::uint32_t) { return true; });
+  }
+  void hold_some(std::size_t first, std::size_t frames, T norm) {
+    hold_if([&](const LinkRun& run, std::uint32_t a, std::uint32_t b) {
+      return (a < places && s.ends.force[a] != 0) || (b < places && s.ends.force[b] != 0) ||
+             may_act_within(run, a, b, first, frames, norm);
+    });
+  }
+  // Chooses the links that are computed and the places that they need.
+  template <class Condition>
+  void hold_if(Condition&& condition) {
+    std::fill_n(s.held.row_of, places, nowhere);
+    s.held.links = 0;
+    s.held.all_links = 0;
+    s.held.places = 0;
+    s.passive.active->links.clear();
+    std::uint32_t passive = 0;
+    std::size_t plain = 0;
+    for (std::size_t h = 0; h < modes.holds.size(); ++h) {
+      const ModalHold& hold = modes.holds[h];
+      const LinkRun& run = program.link_runs[hold.run];
+      const bool is_plain = run.scheme == Scheme::plain;
+      s.held.count_of[h] = 0;
+      for (std::size_t i = 0; i < hold.a.size(); ++i, ++s.held.all_links) {
+        const bool is_held = condition(run, hold.a[i], hold.b[i]);
+        if (is_held) {
+          ++s.held.links;
+          hold_place(hold.a[i]);
+          hold_place(hold.b[i]);
+        }
+        if (is_plain && is_held) {
+          s.held.give[plain] = hold.give.empty() ? T(0) : static_cast<T>(hold.give[i]);
+          s.held.ends[plain++] = {hold.a[i], hold.b[i]};
+          ++s.held.count_of[h];
+        }
+        if (!is_plain) {
+          hold_passive(passive++, is_held);
+        }
+      }
+    }
+    // One alone, or all of them at once by what each moves the others.
+    const std::size_t active = s.passive.active->links.size();
+    s.passive.active->alone = active == 1 ? 1 : 0;
+    s.passive.active->clusters[0].count = active == 1 ? 0 : static_cast<std::uint32_t>(active);
+  }
+  void hold_place(std::uint32_t end) {
+    if (end < places && s.held.row_of[end] == nowhere) {
+      s.held.row_of[end] = s.held.places;
+      s.held.place_of[s.held.places++] = end;
+    }
+  }
+  void hold_passive(std::uint32_t link, bool is_held) {
+    if (!is_held) {
+      s.passive.yield[link] = s.passive.yield_step[link] = s.passive.pushed[link] = 0;
+      return;
+    }
+    s.passive.active->links.push_back(s.passive.links[link]);
+    s.passive.active->links.back().ends = {link, nowhere};
+  }
+
+  // --- passive links
+  // -------------------------------------------------------------------------------
+
+  bool presses() const { return !s.passive.active->links.empty(); }
+
+  // Whether what passive links push may wait for the next sample's sweep: where that kicks nothing
+  // else, and nobody looks at the modes before.
+  bool may_shove_later() const {
+    const bool is_all = std::all_of(s.held.count_of, s.held.count_of + modes.holds.size(),
+                                    [](std::uint32_t plain) { return plain == 0; });
+    return presses() && is_all && s.inputs.pushing == 0 && s.forces.count == 0 &&
+           s.held.places <= most_kicked;
+  }
+  // What has waited.
+  void shove_now() {
+    if (std::exchange(s.passive.shoves_later, false)) {
+      shove_rows<Crossed>(s);
+    }
+  }
+
+  // As a run of samples begins, or in each whose coefficients move.
+  void measure_passive() {
+    if (s.passive.is_reply_stale) {
+      measure_replies<Crossed>(s, places, outputs);
+      s.passive.is_reply_stale = false;
+    }
+    s.passive.is_straight_stale = true;
+    for (std::size_t i = 0; i < s.passive.count; ++i) {
+      s.passive.slack[i] =
+          s.passive.give[i] > 0 ? s.passive.give[i] / coefficient(modes.give_by) : T(0);
+    }
+  }
+
+  void remember_passive() {
+    remember(*s.passive.active, s.passive.memory, ModalBody<T>{s, inverse_mass()});
+  }
+
+  // Once everything else has moved: finds what the links push with, and moves places, what is heard
+  // and the modes. Gives whether any pushes.
+  bool press() {
+    const T w = inverse_mass();
+    T* row = s.passive.memory;
+    for (const PassiveLink& link : s.passive.active->links) {
+      const std::uint32_t i = link.ends.a;
+      const auto [a, b] = s.passive.links[i].ends;
+      s.passive.opening[i] = s.ends.x[a] - s.ends.x[b];
+      s.passive.rush[i] = s.ends.v[a] - s.ends.v[b] - s.passive.yield[i];
+      row[2] = s.passive.pushed[i];  // where looking for it begins
+      row += passive_rows;
+    }
+    ModalBody<T> body{s, w};
+    if (!push_straight(s, body)) {
+      correct(*s.passive.active, s.passive.memory, s.passive.numbers, body);
+    }
+    s.passive.pulls = true;
+    std::fill_n(s.passive.shove, s.held.places, T(0));
+    bool pushes = false;
+    for (const PassiveLink& link : s.passive.active->links) {
+      const std::uint32_t i = link.ends.a;
+      const T force = s.passive.pushed[i];
+      s.passive.yield_step[i] = -s.passive.yield[i] - s.passive.slack[i] * force;
+      s.passive.yield[i] = -s.passive.slack[i] * force;
+      pushes |= force != 0;
+      shove(s.passive.links[i].ends.a, -force);
+      shove(s.passive.links[i].ends.b, force);
+    }
+    for (std::size_t r = 0; pushes && r < s.held.places; ++r) {
+      const T way = moved(s.held.place_of[r]);
+      s.ends.x[s.held.place_of[r]] -= way;
+      s.ends.v[s.held.place_of[r]] -= way;
+    }
+    for (std::size_t o = 0; pushes && o < outputs; ++o) {
+      s.sweep.heard[o] -= moved(places + o);
+    }
+    if (pushes) {
+      move_by_shoves();
+    }
+    return pushes;
+  }
+
+  // How far all pushes move a listener.
+  T moved(std::size_t listener) const {
+    T sum = 0;
+    for (const PassiveLink& link : s.passive.active->links) {
+      sum +=
+          s.passive.reply[listener * s.passive.count + link.ends.a] * s.passive.pushed[link.ends.a];
+    }
+    return inverse_mass() * sum;
+  }
+  void shove(std::uint32_t end, T force) {
+    s.ends.exerted[end] += force;
+    if (end < places) {
+      const T kick = inverse_mass() * force;
+      s.passive.shove[s.held.row_of[end]] += kick;
+      s.ends.kicked[end] += absolute(kick);
+    }
+  }
+  void move_by_shoves() {
+    if (s.sleep.awake < modes.modes) {
+      wake();
+      if (s.held.places + s.inputs.pushing <= most_kicked) {
+        bundle<Crossed>(s, s.sweep.bundled);
+      }
+    }
+    if (!s.passive.shoves_later) {
+      shove_rows<Crossed>(s);
+    }
+  }
+
+  // --- coefficients
+  // --------------------------------------------------------------------------------
+
+  T coefficient(std::uint32_t c) const { return s.ramps.value[c]; }
+  T inverse_mass() const {
+    return modes.inverse_mass == Modes::own_mass ? T(1) : coefficient(modes.inverse_mass);
+  }
+
+  // For how many samples from now on the modes are not what they were in the sample before.
+  std::size_t moving_frames() const {
+    if (s.ramps.frames > 0) {
+      return s.ramps.frames;
+    }
+    const T* used = s.motion.used;
+    bool is_same = true;
+    for (const ModalShare& share : modes.stiffness) {
+      is_same &= *used++ == coefficient(share.coefficient);
+    }
+    for (const ModalShare& share : modes.damping) {
+      is_same &= *used++ == coefficient(share.coefficient);
+    }
+    return is_same && *used == inverse_mass() ? 0 : 1;
+  }
+
+  // A coefficient some samples from now.
+  T coefficient(std::uint32_t c, std::size_t ahead) const {
+    for (std::size_t i = 0; ahead > 0 && i < s.ramps.count; ++i) {
+      if (s.ramps.ramping[i] == c) {
+        return ahead < s.ramps.frames
+                   ? s.ramps.value[c] + static_cast<T>(ahead) * s.ramps.increment[c]
+                   : s.ramps.target[c];
+      }
+    }
+    return coefficient(c);
+  }
+
+  // lK and lZ, some samples from now.
+  void mix(std::size_t ahead, T* k, T* z) {
+    const T w =
+        modes.inverse_mass == Modes::own_mass ? T(1) : coefficient(modes.inverse_mass, ahead);
+    if constexpr (Crossed) {
+      // Placed a sample ahead, in the first one nothing moves them but what pushes.
+      s.motion.is_first = *s.motion.used == 0;
+      const T here = s.motion.is_first ? T(0) : T(1);
+      for (std::size_t i = 0; i < all_packs(s); ++i) {
+        packs(k)[i] = here * packs(s.shapes.pole)[i];
+        packs(z)[i] = here * packs(s.shapes.pole + s.shapes.stride)[i];
+      }
+      *s.motion.used = w;
+      return;
+    }
+    T* used = mix(modes.stiffness, s.shapes.stiffness, ahead, w, k, s.motion.used);
+    used = mix(modes.damping, s.shapes.damping, ahead, w, z, used);
+    *used = w;
+    if (modes.is_exact) {
+      make_exact(s, modes.pushes.size() + modes.places.size() + modes.outputs.size(), k, z);
+    }
+  }
+  T* mix(const std::vector<ModalShare>& shares, const T* factors, std::size_t ahead, T w, T* out,
+         T* used) {
+    for (std::size_t i = 0; i < all_packs(s); ++i) {
+      packs(out)[i] = ModePack<T>{};
+    }
+    for (std::size_t j = 0; j < shares.size(); ++j, ++used) {
+      const std::uint32_t c = shares[j].coefficient;
+      const T value = w * (!shares[j].is_late ? coefficient(c, ahead)
+                           : ahead > 1        ? coefficient(c, ahead - 1)
+                                              : *used);
+      *used = coefficient(c, ahead);
+      constexpr std::size_t lanes = mode_lanes<T>;
+      const std::size_t first = shares[j].first / lanes;
+      const std::size_t end = (shares[j].first + shares[j].factor.size() + lanes - 1) / lanes;
+      for (std::size_t i = first; i < end; ++i, factors += lanes) {
+        packs(out)[i] += value * *packs(factors);
+      }
+    }
+    return used;
+  }
+
+  // The rows by which forces are felt, with the coefficients of now.
+  void mix_forces() {
+    std::size_t force = 0;
+    for (const ModalOutput& output : modes.outputs) {
+      if (!output.is_force) {
+        continue;
+      }
+      T* const rows = s.forces.rows + 2 * force * s.shapes.stride;
+      std::fill_n(rows, 2 * s.shapes.stride, T(0));
+      T still = 0;
+      for (const ModalForce::Part& part : output.force.parts) {
+        const T c = coefficient(part.coefficient);
+        // Of crossed modes both rows are the two parts of one, dampers by the speed's own shape.
+        for (std::size_t i = 0; i < part.shape.size(); ++i) {
+          const std::size_t mode = i % modes.modes;
+          const bool is_second = Crossed ? i >= modes.modes : part.is_damping;
+          const T root = modes.is_exact && !Crossed ? s.motion.root[mode] : T(1);
+          rows[(is_second ? s.shapes.stride : 0) + mode] +=
+              c * root * static_cast<T>(part.shape[i]);
+        }
+        still += c * static_cast<T>(part.constant);
+      }
+      s.forces.still[force++] = still;
+    }
+  }
+
+  // Between here and some samples on exact coefficients move in a straight line: gives how many.
+  // What has just been placed is pulled by nothing in its first sample.
+  std::size_t begin_exact(std::size_t frames) {
+    frames = s.motion.fresh_frames < 2 ? 1 : frames;
+    s.motion.fresh_frames += s.motion.fresh_frames < 2;
+    mix(frames, s.motion.k_step, s.motion.z_step);
+    const T share = T(1) / static_cast<T>(frames);
+    for (std::size_t i = 0; i < all_packs(s); ++i) {
+      packs(s.motion.k_step)[i] = share * (packs(s.motion.k_step)[i] - packs(s.motion.k)[i]);
+      packs(s.motion.z_step)[i] = share * (packs(s.motion.z_step)[i] - packs(s.motion.z)[i]);
+    }
+    return frames;
+  }
+  void advance_exact() {
+    for (std::size_t i = 0; i < all_packs(s); ++i) {
+      packs(s.motion.k)[i] += packs(s.motion.k_step)[i];
+      packs(s.motion.z)[i] += packs(s.motion.z_step)[i];
+    }
+  }
 };
 
 template <class T, bool Crossed>
 void step(const Program& program, const Modes& modes, ModalState<T>& state, const Block<T>& block) {
-  Player<T, Crossed>{{{{modes, state}, program, block}}}.play();
+  ModalPlayer<T, Crossed>{modes, state, program, block}.play();
 }
 
 }  // namespace
