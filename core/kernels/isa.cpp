@@ -46,7 +46,7 @@ void clear_wide_registers() {
 std::size_t whole_pack_bytes(Isa isa) {
 #if defined(__x86_64__)
   if (isa == Isa::v4 && __builtin_cpu_is("amdfam19h")) {
-    return vector_bytes(Isa::v3);  // AMD's first with AVX-512 work on its registers in two halves
+    return vector_bytes(Isa::v3);  // Zen 4 processes AVX-512 registers in two halves
   }
 #endif
   return vector_bytes(isa);

@@ -1,6 +1,6 @@
-// core/kernels: which instructions this machine has. Files named *_step.cpp are compiled once for
-// each of these, into a namespace of that name; everything else is compiled for the base. What such
-// a file offers is a function template over Isa, which the file specialises for its own.
+// core/kernels: the instruction sets of this machine. Files named *_step.cpp are compiled once for
+// each of them, into a namespace of that name. All other files are compiled for the base. Such a
+// file specialises a function template over Isa.
 #pragma once
 
 #include <cstddef>
@@ -10,34 +10,36 @@
 
 namespace ressort::kernels {
 
-// What the build offers: RESSORT_LEAST_ISA, and wider ones with RESSORT_HAS_v3 and RESSORT_HAS_v4.
+// The build has RESSORT_LEAST_ISA, and wider sets if RESSORT_HAS_v3 and RESSORT_HAS_v4 are defined.
 #ifndef RESSORT_LEAST_ISA
 #define RESSORT_LEAST_ISA base
 #endif
 
 enum class Isa {
-  base,  // every x86-64 (SSE2); every other machine, whatever it is
+  base,  // every x86-64 (SSE2), and all other processors
   v3,    // x86-64-v3: AVX2 and FMA
   v4,    // x86-64-v4: AVX-512
 };
 
-// Of one register.
+// Width of a register.
 constexpr std::size_t vector_bytes(Isa isa) {
   return isa == Isa::v4 ? 64 : isa == Isa::v3 ? 32 : 16;
 }
 
-bool has_isa(Isa isa);  // this machine and this build. [any thread]
-Isa best_isa();         // the widest that they have. [any thread]
+// Returns whether this machine and this build have the set. [any thread]
+bool has_isa(Isa isa);
+// Returns the widest set that they have. [any thread]
+Isa best_isa();
 std::string_view isa_name(Isa isa);
 
-// Of the packs that this machine works on whole. [any thread]
+// Returns the width of packs that this machine processes in one operation. [any thread]
 std::size_t whole_pack_bytes(Isa isa);
 
-// Code for narrow registers runs several times slower while the upper halves of wide ones are in
-// use, and compilers do not always clear those on the way out. [audio]
+// Clears the upper halves of wide registers (vzeroupper). Code for narrow registers runs several
+// times slower while they are in use, and compilers do not always clear them. [audio]
 void clear_wide_registers();
 
-// What `make.operator()<Isa>()` gives, called with the instruction set, if the build has it.
+// Returns `make.operator()<isa>()`, or that of the least set if the build does not have `isa`.
 // [any thread]
 template <class Make>
 auto with_isa(Isa isa, const Make& make) {
@@ -55,8 +57,8 @@ auto with_isa(Isa isa, const Make& make) {
   return make.template operator()<Isa::RESSORT_LEAST_ISA>();
 }
 
-// What `make.operator()<bytes>()` gives, called with the width of packs: one that such a file is
-// compiled for, from the `widest` by halves to the `least`.
+// Returns `make.operator()<bytes>()`, where `bytes` is a pack width: `widest` or a half of it, a
+// quarter and so on down to `least`.
 template <std::size_t widest, std::size_t least = 16, class Make>
 static inline auto with_bytes(std::size_t bytes, const Make& make) {
   if constexpr (widest > least) {
@@ -67,7 +69,7 @@ static inline auto with_bytes(std::size_t bytes, const Make& make) {
   return make.template operator()<widest>();
 }
 
-// Of the narrowest register that holds the voices, or of the widest that there is.
+// Returns the lanes of the narrowest register that holds all voices, or of the widest register.
 template <class T>
 constexpr std::size_t lanes_for(std::size_t voices, Isa isa) {
   std::size_t bytes = 16;

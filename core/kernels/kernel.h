@@ -1,4 +1,4 @@
-// core/kernels: one way of stepping a Program, for as many voices at once as it has lanes.
+// core/kernels: the interface of a kernel, which steps a Program for several voices, one per lane.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +16,7 @@ namespace ressort::kernels {
 
 inline constexpr std::size_t max_block_frames = 64;
 
-// What a kernel is driven by and what it fills, for at most max_block_frames samples.
+// The inputs and outputs of a kernel for at most max_block_frames samples.
 template <class T>
 struct Block {
   std::size_t frames = 0;
@@ -25,35 +25,35 @@ struct Block {
   bool is_common = false;       // both are [frame][input], for all lanes
   const T* audio = nullptr;     // [frame][audio coefficient][lane]
   T* outputs = nullptr;         // [frame][output][lane]
-  // Nobody plays in lanes beyond so many: they may be left where they are.
+  // Lanes from this number on have no voice; the kernel may skip them.
   std::size_t lanes = std::numeric_limits<std::size_t>::max();
 };
 
-// The coefficients of a kernel's voices, and how they move: all that are on their way arrive
-// after the same number of samples.
+// The coefficients of a kernel's voices, with linear ramps. All ramps end after the same number of
+// samples.
 template <class T>
 class Coefficients {
  public:
   Coefficients(const Program& program, std::size_t width);
 
-  // At once, or to be reached by the next ramp(). [audio] wait-free
+  // Sets a value at once, or the target of the next ramp(). [audio] wait-free
   void set(std::size_t lane, std::uint32_t c, double value, bool ramped);
   void ramp(std::size_t frames);
-  // One lane as it is in another kernel of the same Program, ramps and all.
+  // Copies one lane, including its ramps, from another kernel of the same Program.
   void go_on(std::size_t lane, const Coefficients& from, std::size_t from_lane);
-  // What a block of samples did to the ramps; values are kept by who steps them.
+  // Ends the ramps that a block of `frames` samples has completed. The kernel updates the values.
   void finish(std::size_t frames);
 
   std::size_t width;
   Aligned<T> value;                    // [coefficient][lane]
   Aligned<T> increment;                // [coefficient][lane] per sample, while ramping
-  Aligned<T> target;                   // [coefficient][lane] where the ramp ends
-  std::vector<std::uint32_t> ramping;  // those that move; at most all of them
+  Aligned<T> target;                   // [coefficient][lane] at the end of the ramp
+  std::vector<std::uint32_t> ramping;  // coefficients that are ramping
   std::vector<bool> is_ramping;        // [coefficient]
-  std::size_t ramp_frames = 0;         // how many samples they still move
+  std::size_t ramp_frames = 0;         // samples until the ramps end
 };
 
-// The same for code that is compiled for several instruction sets. One sample's step:
+// The ramps as plain pointers, for loops that are compiled once for each instruction set.
 template <class T>
 struct Ramps {
   T* value;
@@ -70,6 +70,7 @@ Ramps<T> ramps_of(Coefficients<T>& coefficients) {
           coefficients.ramping.data(), coefficients.ramping.size(),   coefficients.width,
           coefficients.ramp_frames};
 }
+// Advances all ramps by one sample.
 template <class T>
 static inline void advance(Ramps<T>& ramps) {
   if (ramps.frames == 0) {
@@ -90,13 +91,13 @@ static inline void advance(Ramps<T>& ramps) {
   }
 }
 
-// How much of a kernel's work is being done.
+// The number of modes that a kernel steps, and of modes that it has.
 struct Awake {
   std::size_t modes = 0;
-  std::size_t of = 0;  // 0: it has no modes
+  std::size_t of = 0;  // 0 if the kernel has no modes
 };
 
-// What look() does where every node has a position.
+// Implements look() for kernels that keep a position of every node.
 template <class Position>
 std::size_t look_at(std::span<const std::uint32_t> nodes, std::span<double> numbers,
                     Position&& position) {
@@ -109,8 +110,8 @@ std::size_t look_at(std::span<const std::uint32_t> nodes, std::span<double> numb
   return nodes.size();
 }
 
-// The Program outlives its kernels and is shared by them. Nothing here throws or allocates after
-// construction.
+// Steps a Program. Kernels share the Program, which outlives them. No function throws or allocates
+// after construction.
 template <class T>
 class Kernel {
  public:
@@ -121,48 +122,49 @@ class Kernel {
   Kernel& operator=(const Kernel&) = delete;
 
   std::size_t width() const { return coefficients.width; }
-  // Whether Block::is_common may be set where there are several lanes.
+  // Returns whether Block::is_common may be set for a kernel of several lanes.
   virtual bool takes_common_inputs() const { return false; }
 
-  // Puts one lane to positions and velocities, [node]; its coefficients stay. Nothing pulls in the
-  // next sample. [audio]
+  // Sets the positions and velocities of one lane, [node]. Its coefficients stay. Links exert no
+  // force in the next sample. [audio]
   virtual void set_state(std::size_t lane, const double* x, const double* v) = 0;
-  // After it: nor do passive links hold anything in that sample, which only leads to where another
-  // kernel was. [audio]
+  // Disables passive links in the sample after set_state(), too: that sample only reproduces the
+  // state of another kernel. [audio]
   virtual void let_go(std::size_t) {}
-  // The same, to where the model starts.
+  // Sets one lane to the initial state of the model.
   void reset(std::size_t lane) { set_state(lane, start_.position.data(), start_.velocity.data()); }
-  // Where every node is after the last sample, and how fast; false where the kernel does not know
-  // of all. [audio]
+  // Copies the position and velocity of every node after the last sample. Returns false if the
+  // kernel does not have all of them. [audio]
   virtual bool save(std::size_t lane, double* x, double* v) const = 0;
-  // The same of some nodes, [i][lane], as the numbers that they are. [audio]
+  // Copies those of some nodes, [i][lane], without conversion. [audio]
   virtual bool read(std::span<const std::uint32_t> nodes, T* x, T* v) const;
-  // Moves some nodes between two blocks. In the next sample links pull as if these had come to be
-  // there by themselves; nothing else is touched, not even the last bit. False where the kernel
-  // knows of no single nodes. [audio]
+  // Overwrites the state of some nodes between two blocks. In the next sample links act as if the
+  // nodes had moved there by themselves. All other state stays, to the last bit. Returns false if
+  // the kernel has no state per node. [audio]
   virtual bool write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v);
-  // Makes nodes faster by `changes`, per sample, as a force on each in the next sample would:
-  // masses, modes that ring, and places on waveguides. [audio] O(nodes * modes)
+  // Adds `changes` to the velocities of nodes (masses, modes of bodies, places on waveguides), as a
+  // force on each of them in the next sample would. [audio] O(nodes * modes)
   virtual void strike(std::size_t lane, std::span<const std::uint32_t> nodes,
                       std::span<const double> changes) = 0;
-  // Becomes what `from` is, another kernel of the same Program, made for as many voices: the same
-  // next samples, to the bit. False where a kernel cannot. [audio]
+  // Copies the state of another kernel of the same Program and the same number of voices. The next
+  // samples are the same to the bit. Returns false if the kernel does not support this. [audio]
   virtual bool become(const Kernel&) { return false; }
-  // Plays the block by the published scheme, v += F/M, x += v: masses, then position inputs, then
-  // links; the outputs are the new positions. Forces given act in their own sample. [audio]
+  // Computes a block by the published scheme, symplectic Euler: v += F/M, x += v. In each sample
+  // masses move first, then position inputs, then the links compute their forces for the next
+  // sample. The outputs are the new positions. Input forces act in their own sample. [audio]
   void step(const Block<T>& block) {
     play(block);
     clear_wide_registers();
   }
-  // Whether every mass of a lane is nearer than `bound` to where it starts. [audio]
+  // Returns whether every mass of a lane is nearer than `bound` to its initial position. [audio]
   virtual bool is_near_start(std::size_t lane, double bound) const = 0;
-  // For a picture: where some nodes are after the last sample, or of modes how far each has moved,
-  // whatever the nodes. How many numbers that are; 0: there is no room. [audio] O(numbers)
+  // Copies, for a picture, the positions of some nodes after the last sample. A modal kernel copies
+  // the displacements of all modes instead. Returns the count of numbers; 0 if `numbers` is too
+  // small. [audio] O(numbers)
   virtual std::size_t look(std::size_t lane, std::span<const std::uint32_t> nodes,
                            std::span<double> numbers) const = 0;
-  // The same of a waveguide: its displacement from its left end at as many points as there are
-  // numbers, both ends among them, as its waves have it. 0 where there is none. [audio]
-  // O(samples + numbers)
+  // Copies the displacement of a waveguide at equally spaced points from its left to its right end.
+  // Returns 0 if there is no such waveguide. [audio] O(samples + numbers)
   virtual std::size_t look_along(std::size_t, std::size_t, std::span<double>) const { return 0; }
   virtual Awake awake() const { return {}; }  // [audio]
 
@@ -174,8 +176,8 @@ class Kernel {
   const Program& start_;
 };
 
-// The kernel that the Program asks for (Program::form), with at least one lane and no more than
-// `voices` need. The instruction set may be narrower than the machine's, never wider.
+// Makes the kernel of Program::form, with at least one lane and no more lanes than `voices` need.
+// The instruction set must be one that the machine has.
 template <class T>
 std::unique_ptr<Kernel<T>> make_kernel(const Program& program, std::size_t voices, Isa isa);
 

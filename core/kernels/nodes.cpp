@@ -18,7 +18,8 @@ NodeLayout layout_in_rows(std::span<const std::uint32_t> slot, std::size_t slots
   }
   layout.lane.resize(width);
   std::iota(layout.lane.begin(), layout.lane.end(), 0u);
-  // With a line between two rows, as processors take addresses for the same that are 4096 apart.
+  // A cache line of padding separates the rows: addresses that differ by 4096 alias in the store
+  // buffers of many processors.
   layout.row = (slots * width + line - 1) / line * line + line;
   layout.rows = rows;
   layout.size = rows * layout.row;
@@ -149,8 +150,8 @@ void NodeKernel<T>::write(std::span<const std::uint32_t> nodes, const T* x, cons
   std::fill(nodes_.passive.awake.begin(), nodes_.passive.awake.end(), T(1));
 }
 
-// Where forces are found as the masses move, what is new is damped in its own sample: a share of
-// Z/M.
+// A kernel that keeps forces adds the force that causes the change. A kernel that computes forces
+// as the masses move adds the velocity; damping then acts on it in its own sample, by a share Z/M.
 template <class T>
 void NodeKernel<T>::strike(std::size_t lane, std::span<const std::uint32_t> nodes,
                            std::span<const double> changes) {
@@ -182,7 +183,8 @@ std::size_t NodeKernel<T>::look(std::size_t lane, std::span<const std::uint32_t>
                                 std::span<double> numbers) const {
   return look_at(nodes, numbers, [&](std::uint32_t node) {
     const double x = nodes_.position(node, lane);
-    return is_junction(program_, node) ? x - nodes_.velocity(node, lane) / 2 : x;  // as it is heard
+    return is_junction(program_, node) ? x - nodes_.velocity(node, lane) / 2
+                                       : x;  // as its outputs have it
   });
 }
 

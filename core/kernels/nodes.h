@@ -1,5 +1,5 @@
-// core/kernels: the store of a kernel that keeps a position and a velocity of every node, in
-// whatever order its loops need them.
+// core/kernels: the memory of a kernel that keeps a position and a velocity of every node, in the
+// order that its loops need.
 #pragma once
 
 #include "core/kernels/kernel.h"
@@ -8,41 +8,42 @@
 
 namespace ressort::kernels {
 
-// Where positions are among a kernel's numbers: node[i] + lane[j]. What else there is of a node
-// follows, `row` numbers further each: its velocity, then its force and the kernel's own.
+// Where the numbers of a node are: its position in a lane is at node[i] + lane[j]. Its velocity,
+// its force and further numbers of the kernel follow at distances of `row`.
 struct NodeLayout {
   static constexpr std::uint32_t nowhere = 0xffffffffu;
 
-  std::vector<std::uint32_t> node;  // [node], or nowhere: it is at 0 and stays there
+  std::vector<std::uint32_t> node;  // [node] or nowhere: the node is fixed at 0
   std::vector<std::uint32_t> lane;  // [lane]
   std::size_t row = 0;              // numbers
   std::size_t rows = 3;
   std::size_t size = 0;  // of all numbers
 };
 
-// One row after the other: [slot][lane], `slot` being where each node is in a row of `slots`.
+// Returns a layout of rows [slot][lane]. `slot` has the slot of each node, and a row has `slots`.
 template <class T>
 NodeLayout layout_in_rows(std::span<const std::uint32_t> slot, std::size_t slots, std::size_t width,
                           std::size_t rows);
 
-// The same, node by node.
+// Returns a layout of rows [node][lane].
 template <class T>
 NodeLayout layout_in_rows(const Program& program, std::size_t width, std::size_t rows);
 
-// What is kept of where the places are, so that it is looked up only where one moves.
+// Cached weights of the places, which are computed again only if a coordinate changes.
 template <class T>
 struct PlaceRoom {
   PlaceRoom(const Program& program, std::size_t width);
 
-  Aligned<T> placed;  // [tap][u and v][lane] where it was in the last sample; at first nowhere
-  // Of each tap, from `first` on: the nodes that it stands for in all lanes, and how much of each
-  // it is, [node][lane]. A place on a macro that is between other nodes in each lane has none.
+  Aligned<T> placed;  // [tap][u and v][lane] coordinates of the last sample; NaN at first
+  // The nodes that a tap interpolates between and their weights, [node][lane], from `first` on.
+  // A tap that is between different nodes in each lane has none.
   Aligned<T> weights;
   std::vector<std::uint32_t> nodes;
   std::vector<std::size_t> first;    // [tap]
   std::vector<std::uint32_t> count;  // [tap]
 };
 
+// The numbers of all nodes.
 template <class T>
 struct Nodes {
   Nodes(const Program& program, NodeLayout layout);
@@ -55,9 +56,9 @@ struct Nodes {
   double velocity(std::size_t node, std::size_t lane) const;
   void push(std::size_t node, std::size_t lane, double force);
   void put(std::size_t node, std::size_t lane, double x, double v);
-  // A lane's nodes, with 0 in all other rows.
+  // Sets the nodes of a lane and clears all other rows.
   void set(std::size_t lane, const double* x, const double* v);
-  // All that changes, of others in the same layout.
+  // Copies all state from nodes of the same layout.
   void become(const Nodes& from);
 
   NodeLayout layout;
@@ -73,7 +74,7 @@ struct Nodes {
   }
 };
 
-// The part of such a kernel that handles its nodes.
+// A kernel with such a memory.
 template <class T>
 class NodeKernel : public Kernel<T> {
  public:
@@ -92,27 +93,27 @@ class NodeKernel : public Kernel<T> {
       : Kernel<T>(program, layout.lane.size()),
         program_(program),
         nodes_(program, std::move(layout)) {}
-  // All lanes to where the model starts: the last thing that a constructor does.
+  // Sets all lanes to the initial state. A constructor calls it last.
   void reset_lanes();
-  // What become() does of coefficients and nodes; the rest is the kernel's own.
+  // Copies coefficients and nodes: a part of become().
   const NodeKernel& become_nodes(const Kernel<T>& from) {
     const auto& other = static_cast<const NodeKernel&>(from);
     this->coefficients = other.coefficients;
     nodes_.become(other.nodes_);
     return other;
   }
-  // What write_nodes() does where a kernel has it, but for the forces that links exert then.
+  // Writes the state of nodes: write_nodes() without the forces that follow from it.
   void write(std::span<const std::uint32_t> nodes, const T* x, const T* v);
 
   const Program& program_;
   Nodes<T> nodes_;
 
  private:
-  // Whether the force on any node in the next sample is among its numbers already.
+  // Returns whether the nodes have the forces of the next sample already.
   virtual bool keeps_forces() const { return false; }
-  // Whatever a lane has besides its nodes, as at the start.
+  // Resets all that a lane has besides its nodes.
   virtual void clear(std::size_t) {}
-  // Whether that moves by less than `bound` a sample.
+  // Returns whether that changes by less than `bound` per sample.
   virtual bool is_quiet(std::size_t, double) const { return true; }
 };
 

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double reference_rate_hz = 44100.0;
 
-// Most formulas are one number or one parameter, and need no stack.
+// Most formulas are one number or one parameter. These need no stack.
 double value_of(std::span<const Step> formula, std::span<const double> parameters) {
   const bool is_one = formula.size() == 1;
   return is_one && formula[0].op == Op::parameter ? parameters[formula[0].index]

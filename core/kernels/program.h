@@ -1,5 +1,5 @@
-// core/kernels: what runs. A Program is constant and shared by all voices; what changes is in the
-// kernels. Indices and numbers only; the compile room knows the names.
+// core/kernels: the network that runs. A Program is constant and shared by all voices; the state is
+// in the kernels. It has indices and numbers only. The compile room knows the names.
 #pragma once
 
 #include <array>
@@ -21,12 +21,12 @@ struct Coefficient {
   std::uint32_t first = 0;  // steps [first, first + count) of Program::steps
   std::uint32_t count = 0;
   Unit unit = Unit::plain;
-  bool is_fixed = false;         // whatever the key
-  std::uint32_t mode = no_mode;  // index into Program::modes: of the continuous network
+  bool is_fixed = false;         // does not depend on the key
+  std::uint32_t mode = no_mode;  // index into Program::modes, if it belongs to a mode of a body
 };
 
-// A mode of a body: the coefficients of its oscillator, which as a form of the published scheme
-// steps them are three other numbers (core/sampled_mode.h).
+// The coefficients of the oscillator that is a mode of a body. A form of the published scheme steps
+// it with three other numbers (core/sampled_mode.h).
 struct SampledCoefficients {
   std::uint32_t inverse_mass = 0;
   std::uint32_t stiffness = 0;
@@ -46,10 +46,11 @@ struct MassRun {
   bool is_junction = false;  // places on waveguides
 };
 
-// How the force of a link is found.
+// The method that computes the force of a link.
 enum class Scheme : std::uint8_t {
-  plain,              // from where its ends are, as published
-  discrete_gradient,  // from where they were and will be, so that it gains no energy
+  plain,              // explicit: from the positions and velocities of its ends, as published
+  discrete_gradient,  // implicit: the change of its potential over the sample (Gonzalez, 1996);
+                      // passive
 };
 
 // Consecutive links that share law, coefficients and scheme.
@@ -67,7 +68,7 @@ struct Ends {
 };
 
 struct InputSlot {
-  std::uint32_t input = 0;  // index into Machine::inputs: what drives it
+  std::uint32_t input = 0;  // index into Machine::inputs
   bool is_force = false;
   std::uint32_t node = 0;
 };
@@ -75,68 +76,69 @@ struct InputSlot {
 struct OutputSlot {
   std::uint32_t channel = 0;  // from 0
   std::uint32_t node = 0;
-  bool is_force = false;  // what the links and this tick's inputs exert, at the reference rate
-  // What the engine multiplies it by: steps of Program::steps; none: 1. Kernels know nothing of it.
+  bool is_force =
+      false;  // the force of the links and of this sample's inputs, at the reference rate
+  // Gain that the engine applies: steps of Program::steps; none: 1. Kernels ignore it.
   Coefficient level{};
   std::uint32_t origin = 0;  // index into Network::outputs
 };
 
-// A parameter that an audio channel gives for every sample.
+// A parameter that an audio channel sets in every sample.
 struct AudioParameter {
   std::uint32_t parameter = 0;
   int channel = 0;  // from 0
 };
 
-// A place on a rectangle of length * width nodes, by coordinates 0..1. It has no inertia: its
-// position is interpolated, and what acts on it acts on the nodes around it. On a body it is
-// between two of `places`, at each of which all of its modes, the nodes, have a weight.
+// A point on a rectangle of length * width nodes, by coordinates 0..1. It has no inertia: its
+// position is interpolated, and forces on it are distributed to the nodes around it. On a body the
+// nodes are the modes, and the point is between two of `places`, at each of which every mode has a
+// weight.
 struct TapSlot {
-  std::uint32_t node = 0;  // its own
-  // Its nodes in Program::tap_nodes from here on, row by row; where only those around it are there,
-  // from where the first one would be, modulo 2^32.
+  std::uint32_t node = 0;  // of the point itself
+  // Its first node in Program::tap_nodes, row by row. If the Program has only the nodes around the
+  // point, the index that the first one would have, modulo 2^32.
   std::uint32_t first = 0;
   std::uint32_t length = 1;
   std::uint32_t width = 1;
   std::uint32_t u = 0;  // coefficients
   std::uint32_t v = 0;
-  std::uint32_t places = 0;  // 0: no body
-  std::uint32_t shape = 0;   // Program::shapes from here on, [place][mode]
+  std::uint32_t places = 0;  // 0: not on a body
+  std::uint32_t shape = 0;   // first index into Program::shapes, [place][mode]
   bool is_on_body() const { return places > 0; }
 };
 
-// A string or a tube as two waves (core/kernels/waveguides).
+// A string or a tube as two travelling waves (core/kernels/waveguides).
 struct WaveguideSlot {
-  bool is_open = false;                 // free at its ends; else held
+  bool is_open = false;                 // free at its ends instead of fixed
   std::uint32_t inverse_impedance = 0;  // coefficients
   std::uint32_t frequency = 0;          // Hz
   std::uint32_t t60 = 0;                // seconds
   std::uint32_t brightness = 0;
   FiltersAt filters_at;
-  std::uint32_t first = 0;  // its places in Program::junctions
+  std::uint32_t first = 0;  // index of its first place in Program::junctions
   std::uint32_t count = 0;
 };
 
-// A place on a waveguide: a node with an inverse mass, which waves move and not step_masses().
+// A place on a waveguide: a node with an inverse mass that the waves move.
 struct JunctionSlot {
   std::uint32_t node = 0;
-  std::uint32_t u = 0;  // coefficient: where between its ends, 0..1
+  std::uint32_t u = 0;  // coefficient: position between the ends, 0..1
 };
 
-// A part of a network, which no other part touches. Nodes are numbered: masses that move, run by
-// run, and then places on waveguides; then grounds; then position inputs; then places on macros, in
-// the order of `taps`.
+// A connected part of a network. The nodes are numbered in this order: moving masses, run by run;
+// places on waveguides; grounds; position inputs; points on macros, in the order of `taps`.
 struct Program {
   Form form;
   double rate_hz = 44100.0;
-  double rate_ratio = 1.0;       // r above; 1 where numbers are taken raw
-  std::uint32_t moving = 0;      // nodes [0, moving) have inertia, or give way as if they had
+  double rate_ratio = 1.0;       // 44100 Hz / rate_hz; 1 with --no-rescale
+  std::uint32_t moving = 0;      // nodes [0, moving) have inertia: masses and places on waveguides
   std::vector<double> position;  // [node] at the start
   std::vector<double> velocity;  // [node] per sample of rate_hz
   std::vector<MassRun> mass_runs;
   std::vector<LinkRun> link_runs;
   std::vector<Ends> ends;              // [link]
-  std::vector<std::uint32_t> origins;  // [link] where the model has it
-  std::vector<std::uint32_t> masses;   // [node] the same
+  std::vector<std::uint32_t> origins;  // [link] index in the model
+  std::vector<std::uint32_t> masses;   // [node] index in the model
   std::vector<InputSlot> inputs;
   std::vector<TapSlot> taps;
   std::vector<std::uint32_t> tap_nodes;  // nodes
@@ -146,31 +148,31 @@ struct Program {
   std::vector<JunctionSlot> junctions;
   std::vector<OutputSlot> outputs;
   std::vector<AudioParameter> audio_parameters;
-  std::vector<std::uint32_t> audio_coefficients;  // those that depend on an audio parameter
+  std::vector<std::uint32_t> audio_coefficients;  // coefficients that depend on an audio parameter
   std::vector<double> parameters;                 // [parameter] at the start
   std::vector<Step> steps;
   std::vector<Coefficient> coefficients;
   std::vector<std::vector<std::uint32_t>> depending;  // [parameter] coefficients
 };
 
-// Whether every link's force is found as published.
+// Returns whether all links have the plain scheme.
 bool is_plain(const Program& program);
 
-// Of a node that moves; places on waveguides have one, too.
+// Returns the run of a moving node, which may be a place on a waveguide.
 const MassRun& run_of(const Program& program, std::uint32_t node);
-// Whether that is a place on a waveguide: the last of those that move.
+// Returns whether the node is a place on a waveguide. These are the last moving nodes.
 static inline bool is_junction(const Program& program, std::uint32_t node) {
   return node < program.moving && node >= program.moving - program.junctions.size();
 }
 
-// What drives an input, wherever in the network it is.
+// An input of the model, which may drive several parts.
 struct ModelInput {
   int number = 1;  // from 1, as in the model
   bool is_force = false;
-  double position = 0.0;  // where it starts; 0 for a force
+  double position = 0.0;  // at the start; 0 for a force
 };
 
-// A whole network: parts that do not touch each other, each a Program with the same parameters.
+// A whole network: its connected parts, each a Program with the same parameters.
 struct Machine {
   double rate_hz = 44100.0;
   double rate_ratio = 1.0;
@@ -180,11 +182,11 @@ struct Machine {
   std::vector<Program> parts;
 };
 
-// How much larger a coefficient is at a rate lower by r: r^a above.
+// Returns the factor of a coefficient at a sample rate that is lower by r.
 double rate_factor(Unit unit, double r);
 
-// A coefficient's value for a voice: of a body's mode as the Program's form steps it, or of the
-// continuous network. [any thread] wait-free
+// Return the value of a coefficient for a voice: as the Program's form needs it, of the continuous
+// network, or of the published scheme. They differ for modes of bodies only. [any thread] wait-free
 double coefficient_value(const Program& program, const Coefficient& coefficient,
                          std::span<const double> parameters, double stiffness_factor);
 double continuous_value(const Program& program, const Coefficient& coefficient,

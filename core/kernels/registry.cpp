@@ -48,7 +48,7 @@ constexpr auto work_of() -> Work (*)(const Program&, const Workload&) {
   }
 }
 
-// The kernel K of these tables, which `fits(request)` finds or not.
+// Returns the row of kernel K. `Fits` makes its tables.
 template <class Tables, template <class> class K, class Fits>
 constexpr KernelRow row(Method method, std::string_view name, Use use, Fits,
                         double (*least_ns)(const Program&, const Workload&) = nullptr) {
@@ -59,7 +59,7 @@ constexpr KernelRow row(Method method, std::string_view name, Use use, Fits,
       .use = use,
       .fits = [](const Request& request) -> std::optional<Form> {
         if (!request.program.waveguides.empty() && !std::is_same_v<Tables, Direct>) {
-          return std::nullopt;  // whose waves no other kernel has
+          return std::nullopt;  // Only the direct kernel has waveguides.
         }
         std::optional<Tables> tables = Fits()(request);
         return tables ? std::optional<Form>(std::move(*tables)) : std::nullopt;
@@ -101,7 +101,7 @@ constexpr KernelRow rows[] = {
     row<Oversampled, OversampledKernel>(
         Method::oversampled, "oversampled", Use::physical,
         [](const Request& r) {
-          constexpr std::uint32_t times = 4;  // where it is asked for by name
+          constexpr std::uint32_t times = 4;  // With --method oversampled.
           return r.program.moving > 0 && r.program.modes.empty()
                      ? std::optional(oversampled_form(oversampled_program(r.program, times), times))
                      : std::nullopt;

@@ -1,8 +1,9 @@
-// core/kernels: all kernels, a row each. Whoever plans, predicts, explains, times or names them
-// reads the rows.
+// core/kernels: the table of all kernels, with a row for each. The planner, the cost model,
+// explain,
+// --method and the benchmark read the rows.
 //
-// A kernel is a folder: the tables that it computes from, whether a
-// Program has them and what they cost (*_form), the class that steps them, and its loops (*_step).
+// A kernel is a folder: its tables, the function that makes them from a Program, and their cost
+// (*_form), the class that steps them, and its loops (*_step).
 #pragma once
 
 #include <cstdint>
@@ -21,10 +22,10 @@
 
 namespace ressort::kernels {
 
-// By which name a kernel is asked for.
+// The kernels that can be asked for by name.
 enum class Method { direct, chains, modal, grid, batch, oversampled };
 
-// Whom a kernel is wanted for.
+// The inputs of the search for a kernel's tables.
 struct KernelRequest {
   const Program& program;
   const Workload& load;
@@ -34,20 +35,20 @@ struct KernelRequest {
 
 struct KernelRow {
   enum class Use {
-    published,  // the published scheme, in other coordinates at most
-    physical,   // true to the continuous network instead: where a budget asks for it, or by name
-    given,      // comes with several cores, never by its own name
+    published,  // computes the published scheme, possibly in other coordinates
+    physical,   // approximates the continuous network better, for a budget or by name
+    given,      // used for several cores; has no name of its own
   };
 
   Form::Kind kind;  // of its tables
-  Method method;    // of a given one, what it does
+  Method method;    // of a given one, the method of its parts
   std::string_view name;
   Use use;
-  // The tables of a Program; nothing where the kernel cannot play it. [any thread but audio]
+  // Makes the tables of a Program; empty if the kernel cannot play it. [any thread but audio]
   std::optional<Form> (*fits)(const KernelRequest&);
-  // What it costs at least, where fits() takes long; else null.
+  // Returns a lower bound of the cost, if fits() takes long; else null.
   double (*least_ns)(const Program&, const Workload&);
-  // These ask for a Program in the row's own form. Of what it does, where it is not made of others:
+  // The following need a Program in the row's form. `work` is null if the kernel contains others.
   Work (*work)(const Program&, const Workload&);
   double (*predicted_ns)(const Program&, const Workload&);
   std::string (*description)(const Program&);
@@ -56,7 +57,7 @@ struct KernelRow {
   std::unique_ptr<Kernel<double>> (*make_double)(const Program&, std::size_t voices, Isa);
 };
 
-// The one that all others are compared with, and that plays everything, comes last.
+// Returns all rows. The last is the reference, which can play every Program.
 std::span<const KernelRow> kernel_rows();
 
 const KernelRow& row_of(const Form& form);
@@ -67,7 +68,7 @@ std::optional<Method> method_called(std::string_view name);
 // Returns what to use instead of a method that earlier versions had; empty for any other name.
 std::string removed_method_advice(std::string_view name);
 
-// All of one use, the reference first.
+// Returns the methods of one use, the reference first.
 std::vector<Method> methods_for(KernelRow::Use use);
 
 // Nanoseconds a sample for all voices in the form that the Program has, everything that can touch
@@ -75,10 +76,10 @@ std::vector<Method> methods_for(KernelRow::Use use);
 // (prices.h): the same on all machines of one instruction set.
 double predicted_ns(const Program& program, const Workload& load);
 
-// What the form is, of this Program, in words.
+// Describes the form of this Program in words.
 std::string description(const Program& program);
 
-// One voice in this form, in bytes.
+// Returns the memory of one voice in this form, in bytes.
 std::uint64_t voice_bytes(const Program& program, std::uint64_t number_bytes);
 
 }  // namespace ressort::kernels

@@ -1,5 +1,5 @@
-// core/kernels: where points on macros are. Their kernels' loops share this; `static`, since these
-// are compiled for each instruction set.
+// core/kernels: interpolation at points on macros and bodies. The functions are `static` because
+// several loops that are compiled for different instruction sets include them.
 #pragma once
 
 #include "core/kernels/program.h"
@@ -8,19 +8,20 @@ namespace ressort::kernels {
 
 inline constexpr std::size_t tap_corners = 4;
 
-// The nodes around a point, of Program::tap_nodes, and their weights; of a place on a body the
-// places around it, and theirs.
+// The nodes around a point, as indices into Program::tap_nodes, and their weights. For a point on a
+// body, the places next to it instead of nodes.
 template <class T>
 struct Corners {
   std::uint32_t node[tap_corners] = {};
   T weight[tap_corners] = {};
 };
 
-// w_i = max(0, 1 - |p - i|) along each side, p being the coordinate in nodes.
+// Returns the weights of bilinear interpolation: max(0, 1 - |p - i|) along each side, where p is
+// the coordinate in nodes.
 template <class T>
 static inline Corners<T> corners_at(const TapSlot& slot, T u, T v) {
   const auto split = [](T coordinate, std::uint32_t nodes, std::uint32_t& below) {
-    // Not std::clamp: what is no number becomes 0.
+    // Unlike std::clamp, this maps NaN to 0.
     const T within = coordinate > 0 ? (coordinate < 1 ? coordinate : T(1)) : T(0);
     const T p = within * static_cast<T>(nodes - 1);
     below = static_cast<std::uint32_t>(p);
@@ -39,7 +40,7 @@ static inline Corners<T> corners_at(const TapSlot& slot, T u, T v) {
           {(1 - alpha) * (1 - beta), (1 - alpha) * beta, alpha * (1 - beta), alpha * beta}};
 }
 
-// Calls use(node, weight) for those that weigh anything; the others may not exist.
+// Calls use(node, weight) for the corners with a weight above 0. The others may not exist.
 template <class T, class Use>
 static inline void each_corner(const Corners<T>& corners, Use&& use) {
   for (std::size_t i = 0; i < tap_corners; ++i) {
@@ -49,7 +50,7 @@ static inline void each_corner(const Corners<T>& corners, Use&& use) {
   }
 }
 
-// How much a mode moves a place on a body.
+// Returns the displacement of a point on a body per displacement of a mode.
 template <class T>
 static inline T weight_of_mode(const Program& program, const TapSlot& slot,
                                const Corners<T>& corners, std::uint32_t mode) {
@@ -59,7 +60,7 @@ static inline T weight_of_mode(const Program& program, const TapSlot& slot,
          corners.weight[1] * static_cast<T>(far[mode]);
 }
 
-// Calls use(node, weight) for every node that a point stands for.
+// Calls use(node, weight) for every node that moves a point.
 template <class T, class Use>
 static inline void each_behind(const Program& program, const TapSlot& slot,
                                const Corners<T>& corners, Use&& use) {
@@ -72,7 +73,7 @@ static inline void each_behind(const Program& program, const TapSlot& slot,
   }
 }
 
-// Whether a Program has places on bodies, which only some kernels know.
+// Returns whether a Program has points on bodies, which only some kernels support.
 static inline bool has_bodies(const Program& program) {
   for (const TapSlot& slot : program.taps) {
     if (slot.is_on_body()) {

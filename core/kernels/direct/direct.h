@@ -1,9 +1,11 @@
-// core/kernels: the published scheme, mass by mass and link by link, one voice in each lane. Runs
-// every Program; the reference for all other kernels.
+// core/kernels: the published scheme, mass by mass and link by link, one voice in each lane. It
+// runs every Program and is the reference for all other kernels.
 //
-// In (position, velocity) form it is the same maths as 2x[n] - x[n-1], and keeps 10 to 80 dB more
-// in single precision: the velocity is a small number of its own instead of the difference of two
-// large ones.
+// The scheme is symplectic Euler. The published form is Störmer-Verlet, x[n+1] = 2 x[n] - x[n-1] +
+// F/M, which is the same method with x[n] - x[n-1] in place of a velocity (Hairer, Lubich and
+// Wanner, Acta Numerica 12, 2003). Position and velocity are kept instead: the velocity is a small
+// number of its own instead of the difference of two large ones, which is worth 10 to 80 dB in
+// single precision.
 #pragma once
 
 #include "core/kernels/direct/direct_form.h"
@@ -12,7 +14,7 @@
 
 namespace ressort::kernels {
 
-// Everything that one step touches. Rows are [node][lane].
+// Pointers to the state of a kernel, for its loops. Rows are [node][lane].
 template <class T>
 struct DirectState {
   DirectState(Ramps<T> ramps_in, Nodes<T>& nodes)
@@ -37,8 +39,8 @@ struct DirectState {
   Ramps<T> ramps;
   T* x;                 // position
   T* v;                 // change of position per sample
-  T* force;             // summed by the links, used by the next sample
-  Corners<T>* corners;  // [tap][lane] in this sample
+  T* force;             // sum over the links, for the next sample
+  Corners<T>* corners;  // [tap][lane] of this sample
   T* placed;            // PlaceRoom
   T* place_weights;
   std::uint32_t* place_nodes;
@@ -49,15 +51,15 @@ struct DirectState {
   const std::uint32_t* inverse_mass;  // [moving node] coefficient, if there are passive links
   T* memory;                          // [passive link][passive_rows][lane]
   T* solver;                          // PassiveRoom::numbers
-  T* awake;                           // [lane] 0 in the first sample after set_state(), else 1
-  T* felt;  // [node][lane] what passive links did in this sample; null: nobody listens
-  Rails<T>* rails = nullptr;  // only if there are waveguides
+  T* awake;                           // [lane] 0 in the sample after set_state(), else 1
+  T* felt;                    // [node][lane] forces of passive links; null if no output needs them
+  Rails<T>* rails = nullptr;  // null if there are no waveguides
 };
 
 template <class T>
 struct DirectLoops {
   void (*step)(const Program& program, DirectState<T>& state, const Block<T>& block);
-  // The forces that links exert where all is now, added to those that there are; or null.
+  // Adds the forces of the links at the current positions.
   void (*pull)(const Program& program, DirectState<T>& state);
 };
 
@@ -78,7 +80,7 @@ class DirectKernel final : public NodeKernel<T> {
                          std::span<double> numbers) const override {
     return rails_.look(lane, guide, numbers);
   }
-  // Of what masses and waves hold: the books of energy of a test.
+  // For tests, which add up the energy of the waves.
   const Rails<T>& rails() const { return rails_; }
 
  private:

@@ -9,7 +9,7 @@
 
 namespace ressort::kernels {
 
-// Places on macros are moved and spread lane by lane, those on bodies by all modes, in packs.
+// Points on macros are computed lane by lane, points on bodies over all modes in packs.
 Work work(const Program& program, const Direct&, const Workload& load) {
   const double packs = packs_of(load);
   const double widest = static_cast<double>(vector_bytes(load.isa)) / bytes_of_number(load);

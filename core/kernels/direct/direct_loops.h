@@ -10,7 +10,7 @@
 namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
-// DirectState, seen in packs.
+// DirectState with packs in place of numbers.
 template <class T, std::size_t Bytes>
 struct View {
   using V = Pack<T, Bytes>;
@@ -24,7 +24,7 @@ struct View {
         coefficient(reinterpret_cast<const V*>(state.ramps.value)) {}
 
   DirectState<T>& state;
-  // Where a node is from another.
+  // Returns the distance between two nodes.
   V between(std::size_t a, std::size_t b) const { return x[a] - x[b]; }
   void move(std::size_t node) { shift(node, v[node]); }
   void shift(std::size_t node, V way) { x[node] += way; }
@@ -39,7 +39,11 @@ struct View {
   const V* coefficient;
 };
 
-// The loop over one run's masses; `pull` is what acts on one besides its links.
+// Moves the masses of a run by one step of symplectic Euler (semi-implicit Euler; Störmer-Verlet or
+// leapfrog in the velocity half a sample back):
+//   v[n+1] = v[n] + (F[n] - pull(x[n], v[n])) / M,   x[n+1] = x[n] + v[n+1]
+// F is the sum of link and input forces. `pull` is the mass's own spring, damper and gravity. The
+// new velocity moves the position; with the old one the scheme would gain energy at any stiffness.
 template <class S, class Pull>
 void move_masses(const MassRun& run, S& s, Pull&& pull) {
   using V = typename S::V;
@@ -51,7 +55,7 @@ void move_masses(const MassRun& run, S& s, Pull&& pull) {
   }
 }
 
-// Nothing moves a node without inertia.
+// Clears the forces on nodes without inertia, which no force moves.
 template <class S>
 void rest_others(const Program& program, S& s) {
   for (std::size_t i = program.moving; i < s.state.nodes; ++i) {
@@ -80,8 +84,8 @@ void step_masses(const Program& program, S& s) {
   rest_others(program, s);
 }
 
-// The loop over links: `force_of(a, b)` is what pulls at a, and back at b. Inlined like all that
-// leads to it: there are often fewer links of a law than a call would cost.
+// Adds the forces of links: -f at the first end, f at the second (Newton's third law). The loop and
+// its callers are inlined, because a law often has so few links that a call would cost more.
 template <class S, class ForceOf>
 [[gnu::always_inline]] inline void exert(const Ends* ends, std::uint32_t count, S& s,
                                          ForceOf&& force_of) {
@@ -94,7 +98,7 @@ template <class S, class ForceOf>
   }
 }
 
-// Some links of a run, of whatever law, as published.
+// Adds the forces of some links of a run, computed explicitly from positions and velocities.
 template <class S>
 [[gnu::always_inline]] inline void exert_law(const Program& program, const LinkRun& run,
                                              std::uint32_t first, std::uint32_t count, S& s) {
@@ -119,7 +123,7 @@ template <class S>
   }
 }
 
-// Links that are not plain see nodes and places alike.
+// The interface through which the passive solver (passive.h) reads and moves nodes and points.
 template <class S>
 struct Passive {
   using V = typename S::V;
@@ -155,7 +159,7 @@ struct Passive {
       reinterpret_cast<V*>(s.state.felt)[node] += force;
     }
   }
-  // How far one node is moved by a force of 1 at another.
+  // Returns the displacement of node `at` by a unit force on node `from` in one sample.
   V give(std::uint32_t from, std::uint32_t at) const {
     if (from == at && !is_place(program, at)) {
       return inverse_mass(at);
@@ -174,7 +178,7 @@ struct Passive {
 
  private:
   [[gnu::noinline]] V give_of_places(std::uint32_t from, std::uint32_t at) const {
-    // What has no inertia is not moved, and what waves move is not a part of anything.
+    // A node without inertia does not move. A place on a waveguide is not on a macro.
     for (const std::uint32_t node : {from, at}) {
       if (!is_place(program, node) && (node >= program.moving || is_junction(program, node))) {
         return V{};
@@ -229,7 +233,7 @@ template <class S>
   *reinterpret_cast<V*>(s.state.awake) = V{} + 1;
 }
 
-// What acts in the next sample.
+// Adds all link forces for the next sample.
 template <class S>
 [[gnu::always_inline]] inline void pull(const Program& program, S& s) {
   step_links(program, s);
@@ -240,7 +244,7 @@ template <class S>
 typename S::V read_output(const Program& program, const S& s, const typename S::V* value,
                           const OutputSlot& output) {
   if (!output.is_force) {
-    // Even and odd samples at a place on a waveguide are two motions: their mean is heard.
+    // Even and odd samples at a place on a waveguide are independent. The output is their mean.
     return is_junction(program, output.node) ? s.x[output.node] - s.v[output.node] / 2
                                              : s.x[output.node];
   }
@@ -255,6 +259,14 @@ typename S::V read_output(const Program& program, const S& s, const typename S::
   return force / static_cast<Scalar<typename S::V>>(program.rate_ratio * program.rate_ratio);
 }
 
+// Computes a block. In each sample:
+//   1. ramps and audio parameters change the coefficients
+//   2. input forces are added; forces on points are distributed to the nodes around them
+//   3. masses move by the forces of the sample before and the input forces (symplectic Euler)
+//   4. waveguides and position inputs move
+//   5. passive links, which are implicit, correct the new positions
+//   6. plain links compute their forces at the new positions, for the next sample
+//   7. outputs are read
 template <class S, class T>
 void step(const Program& program, DirectState<T>& state, const Block<T>& block) {
   using V = typename S::V;
@@ -265,7 +277,7 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
   auto* coefficient = reinterpret_cast<V*>(state.ramps.value);
   auto* outputs = reinterpret_cast<V*>(block.outputs);
   const std::size_t inputs = program.inputs.size();
-  // What there is at all.
+  // Features that the Program has.
   const bool has_passive = !state.passive.links.empty();
   const bool has_taps = !program.taps.empty();
   const bool has_rails = state.rails != nullptr;

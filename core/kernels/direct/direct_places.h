@@ -1,6 +1,6 @@
-// The loops of the direct form at places: points without inertia that move with what is around
-// them. On a macro these are up to four nodes, other ones in each lane; on a body all of its modes,
-// the same ones in all lanes, so that packs go through them. A part of *_step.cpp.
+// The loops of the direct form at points, which have no inertia and follow the nodes around them.
+// On a macro these are up to four nodes, different ones in each lane. On a body they are all of its
+// modes, the same ones in all lanes, and are processed in packs. A part of direct_step.cpp.
 #pragma once
 
 #include <algorithm>
@@ -11,13 +11,12 @@
 namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
-// Whether a node is a place on a macro or a body; it is then taps[node - taps[0].node].
+// Returns whether a node is a point on a macro or a body. It is then taps[node - taps[0].node].
 bool is_place(const Program& program, std::uint32_t node) {
   return !program.taps.empty() && node >= program.taps[0].node;
 }
 
-// The nodes that a place stands for in all lanes, and how much of each it is; none where these are
-// others in each lane.
+// The nodes of a point and their weights, if the nodes are the same in all lanes; else none.
 template <class V>
 struct Behind {
   std::uint32_t* node;
@@ -33,8 +32,8 @@ Behind<typename S::V> behind(const S& s, std::size_t tap) {
           s.state.count_of_place[tap]};
 }
 
-// The sum of what `term(i)` is: of many in four sums side by side, on any machine and in any lane
-// in the same order.
+// Returns the sum of term(i). Four partial sums hide the latency of the additions. Their order is
+// the same on every machine and in every lane, so the result has the same bits.
 template <class V, class Term>
 [[gnu::always_inline]] inline V sum_of(std::uint32_t count, Term&& term) {
   V sums[4] = {};
@@ -50,14 +49,14 @@ template <class V, class Term>
   return count > tap_corners ? (sums[0] + sums[1]) + (sums[2] + sums[3]) : sums[0];
 }
 
-// Calls use(node, weight) for the up to four nodes around a place on a macro in one lane.
+// Calls use(node, weight) for the up to four nodes around a point on a macro in one lane.
 template <class S, class Use>
 void around(const Program& program, const S& s, std::size_t tap, std::size_t lane, Use&& use) {
   each_corner(s.state.corners[tap * S::lanes + lane],
               [&](std::uint32_t at, auto weight) { use(program.tap_nodes[at], weight); });
 }
 
-// A row of numbers, [node], as a place sees it.
+// Returns the interpolation of a row of numbers, [node], at a point.
 template <class S>
 typename S::V seen_at(const Program& program, const S& s, std::size_t tap,
                       const typename S::V* row) {
@@ -82,7 +81,7 @@ V only_in(std::size_t lane, Scalar<V> value) {
   return select(number == V{} + static_cast<Scalar<V>>(lane), V{} + value, V{});
 }
 
-// Calls use(node, share of the amount) for what gets a part of what is done to a place.
+// Calls use(node, share) for every node that gets a share of an amount at a point.
 template <class S, class Use>
 [[gnu::always_inline]] inline void share_out(const Program& program, const S& s, std::size_t tap,
                                              typename S::V amount, Use&& use) {
@@ -100,7 +99,7 @@ template <class S, class Use>
   }
 }
 
-// Where the places are now: looked up where a coordinate is another than in the last sample.
+// Updates the weights of the points whose coordinates have changed since the last sample.
 template <class S>
 void place_taps(const Program& program, S& s) {
   using V = typename S::V;
@@ -145,7 +144,7 @@ void place_taps(const Program& program, S& s) {
   }
 }
 
-// A place moves with what is around it, and along that when its coordinate changes.
+// Moves the points with the nodes around them, and with their coordinates.
 template <class S>
 void move_taps(const Program& program, S& s) {
   for (std::size_t i = 0; i < program.taps.size(); ++i) {
@@ -153,7 +152,7 @@ void move_taps(const Program& program, S& s) {
   }
 }
 
-// What acts on the places goes to what is around them.
+// Distributes the forces on points to the nodes around them.
 template <class S>
 void spread_taps(const Program& program, S& s) {
   using V = typename S::V;
@@ -166,7 +165,7 @@ void spread_taps(const Program& program, S& s) {
   }
 }
 
-// The links' force at a node; at a place that of what is around it.
+// Returns the force of the links at a node, or, at a point, its interpolation.
 template <class S>
 typename S::V force_at(const Program& program, const S& s, std::uint32_t node) {
   using V = typename S::V;
@@ -179,8 +178,8 @@ typename S::V force_at(const Program& program, const S& s, std::uint32_t node) {
   return felt == nullptr ? force : force + seen_at(program, s, tap, felt);
 }
 
-// How much of what is done to one node reaches another: the sum over all nodes that both stand for,
-// for a place those around it with its weights, of both weights times `part(node)`, a pack.
+// Returns how much of an amount at one node reaches another: the sum of the products of both
+// weights and `part(node)` over all nodes that both interpolate between.
 template <class S, class Part>
 typename S::V shared(const Program& program, const S& s, std::uint32_t from, std::uint32_t at,
                      Part&& part) {

@@ -14,7 +14,7 @@ constexpr std::size_t round_up(std::size_t count, std::size_t unit) {
   return (count + unit - 1) / unit * unit;
 }
 
-// Hands out cache-aligned arrays; the first round only counts them.
+// Allocates cache-aligned arrays from one block. Without memory it only counts.
 template <class T>
 class Arena {
  public:
@@ -39,7 +39,7 @@ std::size_t link_count(const Modes& modes) {
   return count;
 }
 
-// Those of its holds that are not plain; their ends are the form's.
+// Returns the links that are not plain, with the ends of the form.
 std::vector<PassiveLink> passive_links(const Program& program, const Modes& modes) {
   std::vector<PassiveLink> links;
   for (const ModalHold& hold : modes.holds) {
@@ -61,7 +61,7 @@ T norm_of(const std::vector<double>& shape) {
   return static_cast<T>(std::sqrt(sum));
 }
 
-// The arrays of a kernel and the constant ones' content.
+// Lays out the arrays of a kernel, and fills those that are constant.
 template <class T>
 class Furnisher {
  public:
@@ -175,7 +175,7 @@ class Furnisher {
   std::size_t shape_count() const {
     return modes_.pushes.size() + modes_.places.size() + modes_.outputs.size();
   }
-  // Of each share the packs in which it has any, one after the other.
+  // Returns the factors of all shares, for each share only the packs in which it has any.
   const T* factors(const std::vector<ModalShare>& shares) {
     const auto room = [&](const ModalShare& share) {
       return round_up(share.first % lanes_ + share.factor.size(), lanes_);
@@ -195,7 +195,7 @@ class Furnisher {
     }
     return first;
   }
-  // A shape of crossed modes has two parts.
+  // Returns rows of shapes. A shape of crossed modes has two parts.
   template <class Items, class ShapeOf>
   T* rows(const Items& items, ShapeOf&& shape_of) {
     T* const first = arena_.take(items.size() * row_);
@@ -264,7 +264,7 @@ ModalKernel<T>::ModalKernel(const Program& program, const Modes& modes, std::siz
 template <class T>
 void ModalKernel<T>::set_state(std::size_t, const double* x, const double* v) {
   const std::size_t places = modes_.places.size();
-  // Where the model starts, nothing is displaced.
+  // At the initial state of the model no mass is displaced.
   const bool is_start = x == program_.position.data() && v == program_.velocity.data();
   const std::size_t block = std::size_t{modes_.modes} * program_.moving;
   for (std::size_t i = 0; i < modes_.modes; ++i) {
@@ -294,7 +294,7 @@ void ModalKernel<T>::set_state(std::size_t, const double* x, const double* v) {
     state_.ends.x[p] = static_cast<T>(position);
     state_.ends.v[p] = static_cast<T>(velocity);
   }
-  // No link has computed anything yet: in the first sample there is nothing to feel.
+  // Links exert no force in the first sample.
   std::fill_n(state_.motion.used, modes_.stiffness.size() + modes_.damping.size() + 1, T(0));
   std::fill_n(state_.inputs.late, modes_.pushes.size(), T(0));
   std::fill_n(state_.ends.force, places + modes_.ends.size(), T(0));
@@ -316,7 +316,8 @@ void ModalKernel<T>::set_state(std::size_t, const double* x, const double* v) {
   std::fill_n(state_.sleep.loudness, places + modes_.outputs.size(), T(0));
 }
 
-// A mode's damping is not to act on what a force in the next sample adds. What sleeps wakes.
+// Adds velocities. They are divided by 1 - lZ, because the damping of the next sample must not act
+// on them, as it does not act on the force of that sample. All modes wake.
 template <class T>
 void ModalKernel<T>::strike(std::size_t, std::span<const std::uint32_t> nodes,
                             std::span<const double> changes) {
@@ -340,7 +341,7 @@ void ModalKernel<T>::strike(std::size_t, std::span<const std::uint32_t> nodes,
     const double damping = state_.motion.is_stale ? 0.0 : static_cast<double>(state_.motion.z[i]);
     const double gain =
         state_.motion.root != nullptr ? static_cast<double>(state_.motion.root[i]) : 1.0;
-    // What is damped in one sample is not there, as a mode that is left out above half the rate.
+    // A mode that decays within a sample does not ring, such as one above half the rate.
     state_.motion.d[i] += damping < 1.0 ? static_cast<T>(gain * sum(0) / (1.0 - damping)) : T(0);
   }
   wake_all();
@@ -383,7 +384,7 @@ bool ModalKernel<T>::become(const Kernel<T>& from) {
   active_.alone = other.active_.alone;
   active_.clusters[0].count = other.active_.clusters[0].count;
   state_.take_pace(other.state_);
-  state_.sweep.bundled_modes = 0;  // the rows are its own
+  state_.sweep.bundled_modes = 0;  // The rows point into this kernel's memory.
   return true;
 }
 
@@ -402,7 +403,7 @@ void ModalKernel<T>::play(const Block<T>& block) {
   this->coefficients.finish(block.frames);
 }
 
-// Of each output as it is heard and of how far it is from its rest the lesser.
+// Updates the peak of each output: the smaller of the output and its displacement from rest.
 template <class T>
 void ModalKernel<T>::remember_peaks(const Block<T>& block) {
   const std::size_t outputs = modes_.outputs.size();

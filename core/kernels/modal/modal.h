@@ -1,12 +1,13 @@
-// core/kernels: a Program in the eigenvectors of its linear links, one voice.
+// core/kernels: modal superposition: a Program in the eigenvectors of its linear links, one voice.
 //
-// Each mode is an oscillator of its own: d -= lK q + lZ d, q += d, which is the published scheme in
-// another basis, not an approximation. Two ways through a block give the same:
-//   free   nothing nonlinear acts: mode by mode, a few packs in registers for the whole block
-//   bound  sample by sample, so that what links do in one is felt in the next
-// A block is free if the energy cannot bring any mass to where a link acts, or if a free motion
-// turns out not to have met one. With Modes::silence only those modes take part that are not asleep
-// (modal_sleep.h), a first part of the rows.
+// Each mode is an independent oscillator, d -= lK q + lZ d, q += d (symplectic Euler). This is the
+// published scheme in another basis and not an approximation. Places and outputs are sums of
+// shape * q over the modes. A block is computed in one of two ways with the same result:
+//   free   no nonlinear link acts: a few samples of every mode at a time, in registers
+//   bound  sample by sample, because the links' forces act in the next sample
+// A block is free if the energy bounds every place away from all links (modal_bounds.h), or if a
+// free motion, once computed, has met none. With Modes::silence, modes that are inaudible sleep
+// (modal_sleep.h). The awake modes are the first part of each row.
 #pragma once
 
 #include "core/kernels/kernel.h"
@@ -15,10 +16,10 @@
 
 namespace ressort::kernels {
 
-inline constexpr std::uint32_t check_frames = 32;  // from one look at what may sleep to the next...
+inline constexpr std::uint32_t check_frames = 32;  // between two checks for modes that may sleep...
 inline constexpr std::uint32_t long_check_frames = 128;  // ...while few are awake
 
-// So many passive links may be solved as modal_straight.h does: a pack of any kind.
+// Largest number of passive links that modal_straight.h solves: the lanes of the widest pack.
 inline constexpr std::size_t most_straight = widest_bytes / sizeof(float);
 
 // The state of a ModalKernel: one object for each of its jobs. The arrays are the kernel's memory.
@@ -236,16 +237,18 @@ class ModalKernel final : public Kernel<T> {
  public:
   ModalKernel(const Program& program, const Modes& modes, std::size_t voices, Isa isa);
   void set_state(std::size_t lane, const double* x, const double* v) override;
-  // Modes that nobody hears are left out: false.
+  // Returns false: inaudible modes are left out, so the state of the nodes is not known.
   bool save(std::size_t lane, double* x, double* v) const override;
   void strike(std::size_t lane, std::span<const std::uint32_t> nodes,
               std::span<const double> changes) override;
-  // By the length of the modes' displacement, which no mass exceeds: it may be late, never early.
+  // Uses the norm of the modes' displacement, which bounds that of every mass. The answer may be
+  // false too long, never true too early.
   bool is_near_start(std::size_t lane, double bound) const override;
   std::size_t look(std::size_t lane, std::span<const std::uint32_t> nodes,
                    std::span<double> numbers) const override;
   Awake awake() const override;
-  // The most that a listener, a place or then an output, may be off by what sleeps or has slept.
+  // Returns a bound on the error of a listener (a place or, after these, an output) by modes that
+  // sleep or have slept.
   double owed(std::size_t listener) const;
   bool become(const Kernel<T>& from) override;
 

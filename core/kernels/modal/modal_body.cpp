@@ -16,11 +16,12 @@ using namespace linear_algebra;
 
 namespace {
 
-// Each takes a matrix of all masses, or a vector; with so many the form is of no use.
+// Each frame has a vector over all modes. With more frames the form would be too slow.
 constexpr std::size_t most_frames = 256;
 constexpr std::size_t most_runs = 65'536;
-constexpr double shared_tolerance = 1e-12;  // of a matrix' largest element: is it diagonal?
-constexpr double zero_factor = 1e-13;       // of the largest: is it anything?
+constexpr double shared_tolerance =
+    1e-12;  // share of the largest element, below which an element off the diagonal counts as 0
+constexpr double zero_factor = 1e-13;  // share of the largest, below which a factor counts as 0
 
 void add_share(std::vector<MassShare>& shares, std::uint32_t mass, double weight) {
   for (MassShare& share : shares) {
@@ -73,8 +74,8 @@ class BodyMaker {
     }
   }
 
-  // What is sampled of a body's mode depends on all of its numbers, what is continuous on its own:
-  // a T60 that turns leaves the mass alone.
+  // A sampled number of a body's mode depends on all of the mode's numbers. A continuous one
+  // depends on itself alone: a changing T60 does not change the mass.
   bool has_parameter(const Coefficient& coefficient) const {
     const auto first = program_.steps.begin() + coefficient.first;
     return std::any_of(first, first + coefficient.count,
@@ -85,7 +86,7 @@ class BodyMaker {
     return program_.taps.empty() ? program_.position.size() : program_.taps[0].node;
   }
 
-  // A ground that stays but claims to have a velocity is left to the direct form.
+  // Grounds with a velocity, which links see although the ground stays, need the direct form.
   bool has_sliding_ground() const {
     for (std::uint32_t node = body_.count; node < first_place(); ++node) {
       if (body_.input[node] == LinearBody::nowhere && program_.velocity[node] != 0.0) {
@@ -100,7 +101,7 @@ class BodyMaker {
     });
   }
 
-  // All masses turn with one coefficient, or none turns.
+  // Checks that all masses depend on one coefficient, or on none.
   bool weigh_masses() {
     body_.root = Vector(1.0, body_.count);
     const std::uint32_t first = program_.mass_runs.front().inverse_mass;
@@ -146,8 +147,8 @@ class BodyMaker {
     }
   }
 
-  // The frame of a coefficient. Constants that keys move alike are one frame: then the coefficient
-  // is that of the first, and the weight is relative to it.
+  // Returns the frame of a coefficient. Constants that keys scale alike share a frame, which has
+  // the coefficient of the first; the weight of a bar is relative to it.
   Frame& frame_of(std::vector<Frame>& frames, std::uint32_t c, bool is_late, double& weight) {
     weight = 1.0;
     for (Frame& frame : frames) {
@@ -191,7 +192,7 @@ class BodyMaker {
     return bar;
   }
 
-  // Linear links and oscillators become frames. False if there are too many.
+  // Adds linear links and oscillators to the frames. Returns false if there are too many frames.
   bool sort_links() {
     for (const MassRun& run : program_.mass_runs) {
       for (std::uint32_t i = run.first; run.is_oscillator && i < run.first + run.count; ++i) {
@@ -218,7 +219,7 @@ class BodyMaker {
   LinearBody body_;
 };
 
-// How much of what acts on one node is felt at another, grounds and inputs among them.
+// Returns the share of a force on one node that acts at another. They may be grounds and inputs.
 double share_felt(const LinearBody& body, std::uint32_t from, std::uint32_t at) {
   double sum = 0.0;
   for (const MassShare& pushed : body.around[from]) {
@@ -414,7 +415,8 @@ void Eigenmodes::add(Matrix& matrix, const Bar& bar) const {
   }
 }
 
-// Bar by bar: as sums of squares the factors are exact even where small.
+// Computes the factors bar by bar: as sums of squares they have a small relative error even if
+// small.
 bool Eigenmodes::measure(std::vector<Frame>& frames, const Progress& progress) const {
   for (Frame& frame : frames) {
     const std::vector<std::uint32_t> groups = groups_of(frame);
@@ -446,7 +448,7 @@ bool Eigenmodes::measure(std::vector<Frame>& frames, const Progress& progress) c
         return false;
       }
     }
-    // A mode that moves as a whole is not held at all.
+    // Rigid-body modes have a factor of exactly 0.
     for (double& factor : frame.factor) {
       factor = std::fabs(factor) < zero_factor * most ? 0.0 : factor;
     }

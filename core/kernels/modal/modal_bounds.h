@@ -1,10 +1,10 @@
-// core/kernels: how far the energy lets the modes of a ModalState move, and whether a link can act
-// there; a part of modal_step.cpp, which alone includes it.
+// core/kernels: bounds on the motion of the modes by their energy, and whether a link can act
+// within them. A part of modal_step.cpp.
 //
-// The energy of a mode, m d^2 + lK (q - d/2)^2 with m = 1 - lZ/2 - lK/4, never grows by itself, and
-// bounds q^2 by 1/lK + 1/(4m) times itself. A soft mode may drift instead: its q^2 counts as well,
-// and it goes no farther in a block than its speed allows. The root of the energy is a norm: what
-// pushes add to it adds up.
+// The discrete energy of a mode, m d^2 + lK (q - d/2)^2 with m = 1 - lZ/2 - lK/4, never grows
+// without a force. It bounds q^2 by the energy times 1/lK + 1/(4m). A soft mode may drift: for it
+// q^2 is added to the energy, and its velocity bounds its way in a block. The square root of the
+// energy is a norm, so the contributions of pushes add up (triangle inequality).
 #pragma once
 
 #include <limits>
@@ -15,8 +15,8 @@
 namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
-constexpr double least_stiffness = 1e-4;  // lK of a mode that is not soft
-constexpr double least_mass = 0.01;       // m, below which nothing is promised
+constexpr double least_stiffness = 1e-4;  // lK from which on a mode is not soft
+constexpr double least_mass = 0.01;       // m, below which there is no bound
 constexpr double drift_frames = static_cast<double>(max_block_frames);
 
 template <class T>
@@ -30,8 +30,8 @@ struct Range {
   }
 };
 
-// The greatest square of each place's displacement for an energy of 1. False where the modes may
-// gain energy by themselves.
+// Computes the largest square of each place's displacement for an energy of 1. Returns false if the
+// modes may gain energy by themselves.
 template <class T>
 bool measure_compliance(ModalState<T>& s, std::size_t places) {
   for (std::size_t p = 0; p < places; ++p) {
@@ -70,13 +70,13 @@ T energy(const ModalState<T>& s) {
   return total<T>(sum);
 }
 
-// How the norm may grow by kicks whose sizes add up to `sum`, along a row of a length.
+// Returns the growth of the norm by kicks that add up to `sum`, along a row of this length.
 template <class T>
 T norm_of_kicks(T sum, T length) {
-  return T(1.001) * sum * length;  // a soft mode's q^2 and roundings included
+  return T(1.001) * sum * length;  // with a margin for soft modes and rounding
 }
 
-// Whether a link may act while d is in a range.
+// Returns whether a link may exert a force while its distance is in a range.
 template <class T>
 bool may_act(const LinkRun& run, const T* coefficients, Range<T> d) {
   const auto c = [&](std::size_t i) { return coefficients[run.coefficients[i]]; };
@@ -96,8 +96,8 @@ inline bool lets_go(Law law) {
   return facts_of(law).lets_go();
 }
 
-// What is left of a link's force where its ends give way, as a spring in series with it does. For
-// a curved law by the line through where it is; what only rubs is not felt by a spring.
+// Returns the share of a link's force that remains with a compliance in series. For a curved law
+// its secant is used. Friction has no stiffness and is not reduced.
 template <class T, class ForceLaw>
 T share_of_give(const ForceLaw& law, T d, T give) {
   const T stiffness = law.secant(d);

@@ -10,17 +10,16 @@
 namespace ressort::kernels {
 namespace {
 
-// `places` and what else has rows of its own along the modes; how many outputs are heard along
-// them.
+// The rows along the modes: places, other rows, and outputs.
 struct Rows {
   double places = 0.0;
   double heard = 0.0;
   double pushed = 0.0;
 };
 
-// Of modes that nothing holds a whole block is one sum.
+// Returns the work of free motion, in which a block is one sum.
 Work modal_work(double modes, const Rows& rows, const Workload& load) {
-  constexpr double most_rows = 8.0;  // that are summed in one sweep
+  constexpr double most_rows = 8.0;  // of one sweep
   const double held = rows.places + rows.pushed;
   Work work;
   work.add(Item::modal_moving_sample, load.moving)
@@ -49,9 +48,9 @@ double passive_count(const Program& program) {
   return links;
 }
 
-// Through the modes each passive link pulls at all others: several are solved together, at once if
-// they are straight where they act. What they push with is added to all modes along the next sweep,
-// if that has room, or four places at a time. A pick passes, so that it counts by half.
+// Returns the work of passive links. They are coupled through the modes and solved together,
+// directly if their laws are linear where they act. Their forces are added to all modes in the next
+// sweep, or for four places at a time. A plectrum acts half of the time, so it counts by half.
 void add_solving(const Program& program, double modes, double places, Work& work) {
   constexpr double of_a_straight_link = 28.0;
   constexpr double of_a_link = 110.0;
@@ -85,7 +84,7 @@ std::string in_db(double share) {
 }  // namespace
 
 Work work(const Program& program, const Modes& form, const Workload& load) {
-  // A force is heard along two rows of its own, sample by sample, as places are.
+  // An output that is a force has two rows, and is computed sample by sample.
   const auto places = static_cast<double>(form.places.size());
   const Rows rows{.places = places + static_cast<double>(2 * force_count(form)),
                   .heard = static_cast<double>(form.outputs.size()),
@@ -98,7 +97,7 @@ Work work(const Program& program, const Modes& form, const Workload& load) {
 
 double least_modal_ns(const Program& program, const Workload& load) {
   const LinkCount links = links_of(program);
-  // Two links at one mass share its place, so each is counted as half of one.
+  // Two links at one mass share its place, so each counts as half of one.
   const double places = 0.5 * (links.bent + links.others + passive_count(program));
   const Rows rows{.places = places, .heard = static_cast<double>(program.outputs.size())};
   Work work = modal_work(program.moving, rows, load);

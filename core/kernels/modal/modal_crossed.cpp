@@ -15,8 +15,9 @@ namespace {
 using Complex = std::complex<double>;
 
 constexpr double most_condition = 1e8;
-constexpr double same_pole = 1e-9;   // of the largest p - 1: poles that share their vectors
-constexpr double least_norm = 1e-9;  // of X^T P' X, of what it might be: no defect
+constexpr double same_pole = 1e-9;  // share of the largest p - 1, within which poles count as equal
+constexpr double least_norm =
+    1e-9;  // share of the largest possible X^T P' X, below which a pole counts as defective
 constexpr double least_pole = 1e-30;
 constexpr double highest_frequency = 3.1;
 constexpr double most_inconsistency = 1e-8;
@@ -52,8 +53,8 @@ class CrossedFinder {
            (body_.inverse_mass == Modes::own_mass || !body_.is_live[body_.inverse_mass]);
   }
 
-  // K and Z for masses of 1, with row i the mass i divided by its root; and what masses have of
-  // their own, which acts from the first sample on.
+  // Assembles K and Z for masses of 1 (row i is mass i divided by its root), and the masses' own
+  // springs and dampers, which act from the first sample on.
   bool assemble() {
     Vector pull(n_);
     const double w = body_.weight();
@@ -85,8 +86,8 @@ class CrossedFinder {
     return true;
   }
 
-  // In the eigenvectors of K, each in units of its own frequency: there the matrix is normal but
-  // for the damping, and slow poles are as exact as fast ones.
+  // Computes the poles of the first-order system in the eigenvectors of K, scaled by their
+  // frequencies. Without damping that matrix is normal, so slow poles are as accurate as fast ones.
   bool find_poles() {
     const Eigenpairs stiff = symmetric_eigenpairs(k_);
     const double most = std::max(stiff.values.max(), 0.0);
@@ -95,7 +96,8 @@ class CrossedFinder {
     }
     const Matrix damping = in_basis(z_, stiff.vectors);
     Vector unit(n_);
-    Matrix flow(2 * n_, 2 * n_);  // (unit q, change of q) less itself, or its derivative
+    Matrix flow(2 * n_,
+                2 * n_);  // of (q in units, change of q): its step minus 1, or its derivative
     for (std::size_t i = 0; i < n_; ++i) {
       unit[i] = std::sqrt(std::max(stiff.values[i], 1e-8 * most));
     }
@@ -130,14 +132,14 @@ class CrossedFinder {
     return true;
   }
 
-  // e^s - 1, no difference of equals.
+  // Returns e^s - 1 without cancellation.
   static Complex growth(Complex s) {
     const double half = std::sin(0.5 * s.imag());
     return {std::expm1(s.real()) * std::cos(s.imag()) - 2.0 * half * half,
             std::exp(s.real()) * std::sin(s.imag())};
   }
 
-  // X^T P' Y at a pole.
+  // Returns X^T P' Y at a pole.
   Complex inner(Complex at, const ComplexVector& x, const ComplexVector& y) const {
     Complex sum = 0.0;
     for (std::size_t i = 0; i < n_; ++i) {
@@ -150,7 +152,7 @@ class CrossedFinder {
     return sum;
   }
 
-  // `at` is s, or z - 1. Of several with one pole each is made orthogonal to those before.
+  // Computes the eigenvectors; `at` is s or z - 1. Vectors of equal poles are made orthogonal.
   bool add_mode(Complex at, ComplexVector x) {
     const Complex less = is_exact_ ? growth(at) : at;
     const Complex pole = 1.0 + less;
@@ -179,13 +181,13 @@ class CrossedFinder {
     return true;
   }
 
-  // Which real numbers the modes are, [number]: the real or the imaginary part of a mode.
+  // Lists the real numbers of the modes: the real or the imaginary part of each.
   struct Number {
     std::size_t mode = 0;
     bool is_imaginary = false;
   };
 
-  // What positions and changes are worth in modes: the inverse of what modes put where.
+  // Computes the modes of positions and velocities: the inverse of the matrix of shapes.
   bool find_states() {
     const std::size_t count = shape_.size();
     std::vector<Number> numbers;
@@ -243,7 +245,7 @@ class CrossedFinder {
     return imaginary > real;
   }
 
-  // A push moves a mass and its change alike, by the shapes; which is a proof of them.
+  // Checks the shapes: a force must change position and velocity of a mass by the same amount.
   bool replies_agree() {
     const std::size_t count = shape_.size();
     double most = 0.0;
@@ -272,16 +274,16 @@ class CrossedFinder {
     return true;
   }
 
-  // The modes are those of a published scheme with an M, K and Z of its own, where
-  //   v+ = v - M^-1 (K x + Z v),  M^-1 = the real part of u u^T
-  // which gains no energy at any end if K, Z and 4M - K - 2Z are not negative.
+  // Checks passivity. The modes are those of a published scheme with other M, K and Z,
+  //   v[n+1] = v[n] - M^-1 (K x + Z v),  M^-1 = the real part of u u^T
+  // which gains no energy at any end if K, Z and 4M - K - 2Z are positive semidefinite.
   bool is_passive() const {
     const std::size_t count = shape_.size();
     Matrix reply(n_, n_);
     Matrix held(n_, n_);
     Matrix slowed(n_, n_);
     for (std::size_t m = 0; m < n_; ++m) {
-      ComplexVector next(count);  // what a mode adds to the change of mass m
+      ComplexVector next(count);  // contribution of each mode to the velocity of mass m
       for (std::size_t j = 0; j < count; ++j) {
         next[j] = shape_[j][m] * less_[j];
       }
@@ -367,7 +369,7 @@ class CrossedFinder {
   std::vector<ComplexVector> plain_;  // [mode] X
   std::vector<ComplexVector> shape_;  // [mode] u, in rows
   std::vector<Vector> rows_;          // [row] u
-  std::vector<Vector> worth_;         // [row of positions, then of changes] in modes
+  std::vector<Vector> worth_;         // [row of positions, then of velocities] in modes
   CrossedModes made_;
 };
 

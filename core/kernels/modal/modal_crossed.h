@@ -1,11 +1,12 @@
-// core/kernels: the modes of a body whose damping does not share the eigenvectors of its stiffness.
+// core/kernels: complex modes, for a network with non-proportional damping.
 //
-// Each is a complex number y of its own, y+ = p y + u f, and a mass is where the real part of the
-// sum of all u y puts it. As M, K and Z are symmetric one u does for what pushes a mass and for
-// where it is: of the pencil P(z) = (z-1)^2 M + (z-1) Z + z K, or s^2 M + s Z + K with p = e^s,
+// A mode is a complex number y with y[n+1] = p y[n] + u f[n], and the position of a mass is the
+// real part of the sum of u y over the modes. M, K and Z are symmetric, so the same u distributes
+// forces and reads positions. It is an eigenvector of the quadratic eigenvalue problem of the
+// pencil P(z) = (z-1)^2 M + (z-1) Z + z K, or s^2 M + s Z + K with p = e^s for exact modes:
 //   P(z) X = 0,  u = sqrt(p / X^T P' X) X
-// (Tisseur and Meerbergen, SIAM Rev. 43, 2001). A pair of conjugates is one mode, a real pole is
-// one as well.
+// (Tisseur and Meerbergen, SIAM Rev. 43, 2001). A pair of complex conjugates is one mode, and a
+// real pole is one mode.
 #pragma once
 
 #include <optional>
@@ -15,28 +16,31 @@
 
 namespace ressort::kernels {
 
-inline constexpr std::uint32_t most_crossed_masses = 256;  // beyond, finding them takes too long
+inline constexpr std::uint32_t most_crossed_masses = 256;  // more take too long to compute
 
 // Rows are [real part, imaginary part][mode].
 struct CrossedModes {
   std::size_t count = 0;
-  Vector pole;                        // p - 1
-  std::vector<Vector> shape;          // [mass] u
-  std::vector<Vector> push;           // [mass] what a force of 1 does that is held for a sample
-  std::vector<Vector> speed;          // [mass] its change in the last sample
-  std::vector<Vector> from_position;  // [mass] what it is worth, a sample after it is placed
-  std::vector<Vector> from_velocity;  // [mass]
-  Vector start;                       // the modes, a sample after the start
-  Vector rest;                        // [mass] where it rests
+  Vector pole;                // p - 1
+  std::vector<Vector> shape;  // [mass] u
+  std::vector<Vector> push;   // [mass] response to a unit force that is held for a sample
+  std::vector<Vector> speed;  // [mass] velocity
+  std::vector<Vector>
+      from_position;  // [mass] response to an initial displacement, one sample later
+  std::vector<Vector> from_velocity;  // [mass] to an initial velocity
+  Vector start;                       // state one sample after the start
+  Vector rest;                        // [mass] equilibrium
 };
 
-// The published scheme's, or true to the continuous network. With the parameters where they are:
-// the shapes are of no use for others. Nothing where parameters may turn K, Z or M; where the
-// condition of the eigenvectors is above 1e8 (critical damping, what drifts), a pole is faster than
-// Nyquist's frequency or gone in a sample, nothing says where it rests; or where passive links are
-// to hold on to exact modes that may gain energy at their ends: unless the scheme whose modes these
-// are has no negative damping, as mostly where something damps all masses. O(masses^3): 0.15 s for
-// 120, 1.2 s for 250.
+// Computes the complex modes of the published scheme, or, if `is_exact`, of the continuous network,
+// for the initial parameters. Empty if
+//   - parameters may change K, Z or M, because the shapes depend on them;
+//   - the condition of the eigenvectors is above 1e8 (critical damping, drifting masses);
+//   - a pole is above the Nyquist frequency, or decays within a sample;
+//   - there is no equilibrium;
+//   - passive links act on exact modes that may gain energy at their ends. This is excluded if the
+//     scheme with these modes has no negative damping, which is usual if all masses are damped.
+// O(masses^3): 0.15 s for 120 masses, 1.2 s for 250.
 std::optional<CrossedModes> crossed_modes(const Program& program, const LinearBody& body,
                                           bool is_exact, bool is_held_passively);
 

@@ -1,11 +1,11 @@
-// core/kernels: the modes true to the continuous network (Modes::is_exact); a part of
-// modal_step.cpp, which alone includes it.
+// core/kernels: exact discretisation of modes (Modes::is_exact). A part of modal_step.cpp.
 //
-// q'' + Z q' + K q = F, sampled, is again a mode of the published scheme, with r = e^(-Z/2) and
-// w^2 = K - Z^2/4:  lZ = 1 - r^2,  lK = 1 + r^2 - 2 r cos w, and with lK/K of the force, which
-// gives the same displacement at rest (Gautschi). All of these are smooth functions of K and Z,
-// whether the mode rings or creeps. Of the gain each side takes the root: shapes and q are scaled
-// by it.
+// The samples of q'' + Z q' + K q = F are a mode of the published scheme with r = e^(-Z/2) and
+// w^2 = K - Z^2/4:  lZ = 1 - r^2,  lK = 1 + r^2 - 2 r cos w. The force is multiplied by the gain
+// lK/K, which gives the exact displacement at rest (Gautschi, Numerische Mathematik 3, 1961). All
+// of these are smooth functions of K and Z, for oscillating and for overdamped modes. Shapes and q
+// are scaled by the square root of the gain, so that it acts once where a force enters and once
+// where a displacement is read.
 #pragma once
 
 #include "core/kernels/modal/modal_form.h"
@@ -15,8 +15,8 @@
 namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
-constexpr double most_damping = 8.0;  // Z beyond which a mode is gone in a sample anyway
-constexpr double least_share = 1e-6;  // K per Z^2 below which the mode only creeps
+constexpr double most_damping = 8.0;  // Z from which on a mode decays within a sample
+constexpr double least_share = 1e-6;  // K per Z^2 below which the mode is overdamped
 
 template <class V>
 V lesser(V a, double most) {
@@ -24,7 +24,7 @@ V lesser(V a, double most) {
   return select(a < V{} + T(most), a, V{} + T(most));
 }
 
-// (2 - 2 cos sqrt(u)) / u
+// Returns (2 - 2 cos sqrt(u)) / u by its Taylor series.
 template <class V>
 V ripple(V u) {
   using T = Scalar<V>;
@@ -36,7 +36,7 @@ V ripple(V u) {
   return sum;
 }
 
-// 1 - e^-x, for x up to 1
+// Returns 1 - e^-x for x up to 1, by its Taylor series.
 template <class V>
 V loss(V x) {
   using T = Scalar<V>;
@@ -48,7 +48,7 @@ V loss(V x) {
   return x * sum;
 }
 
-// Makes lK and lZ of K and Z; gives the force's gain.
+// Replaces K and Z by lK and lZ. Returns the gain of the force.
 template <class V>
 V make_exact(V& k, V& z) {
   using T = Scalar<V>;
@@ -71,7 +71,7 @@ V make_exact(V& k, V& z) {
   return gain;
 }
 
-// The same of all modes.
+// Does this for all modes, and scales shapes and states by the root of the gain.
 template <class T>
 void make_exact(ModalState<T>& s, std::size_t shapes, T* k, T* z) {
   using V = ModePack<T>;

@@ -19,10 +19,10 @@ using namespace linear_algebra;
 
 namespace {
 
-constexpr double zero_tolerance = 1e-13;  // of the largest: is it anything?
+constexpr double zero_tolerance = 1e-13;  // share of the largest, below which a number counts as 0
 
-// The published scheme's lK and lZ that are the continuous K and Z, sampled; gives the force's gain
-// (core/kernels/modal/modal_exact.h).
+// Replaces the continuous K and Z by lK and lZ of the published scheme (modal_exact.h). Returns the
+// gain of the force.
 double make_exact(double& k, double& z) {
   const SampledMode sampled = sampled_mode(1.0, k, z);
   const double stiffness = sampled.stiffness / sampled.mass;
@@ -32,8 +32,10 @@ double make_exact(double& k, double& z) {
   return gain;
 }
 
-constexpr std::size_t most_passive = 32;  // links: each pulls at all others
+constexpr std::size_t most_passive = 32;  // links, which are solved together
 constexpr double left_out_share = 0.02;   // of the budget
+
+// Makes the modal form of a Program.
 class ModesFinder {
  public:
   ModesFinder(const Program& program, const LinearBody& body, const model::Budget& budget,
@@ -87,7 +89,8 @@ class ModesFinder {
                        [](const OutputSlot& output) { return output.is_force; });
   }
 
-  // Through the modes each pulls at all others: they are solved together.
+  // Returns whether there are too many passive links. They are coupled through the modes, so they
+  // are solved together.
   bool has_many_passive() const {
     std::size_t count = 0;
     for (const LinkRun& run : program_.link_runs) {
@@ -96,7 +99,7 @@ class ModesFinder {
     return count > most_passive;
   }
 
-  // How the modes move a sum of masses.
+  // Returns the displacement of a weighted sum of masses per displacement of each mode.
   Vector row_of(const std::vector<MassShare>& shares) const {
     if (modes_.is_crossed) {
       return sum_of(crossed_.shape, shares);
@@ -133,7 +136,7 @@ class ModesFinder {
   static std::vector<double> numbers_of(const Vector& row) {
     return {std::begin(row), std::end(row)};
   }
-  // What a force on each mass does to the modes.
+  // Returns the force on each mode by forces on the masses.
   Vector modal(const Vector& force) const {
     if (modes_.is_crossed) {
       Vector row(crossed_.push[0].size());
@@ -144,7 +147,7 @@ class ModesFinder {
     }
     return in_modes(body_.root * force);
   }
-  // By mode what is by mass.
+  // Returns a sum over masses for each mode.
   Vector in_modes(const Vector& masses) const {
     Vector modes(count_);
     for (std::uint32_t mass = 0; mass < count_; ++mass) {
@@ -153,7 +156,8 @@ class ModesFinder {
     return modes;
   }
 
-  // q is counted from where all springs are at rest, or from the start where none pulls.
+  // Chooses the origin of q: the equilibrium of all springs, or the start for modes without
+  // springs.
   void settle(const Eigenmodes& eigenmodes) {
     Vector position(count_);
     Vector velocity(count_);
@@ -190,7 +194,7 @@ class ModesFinder {
     }
   }
 
-  // Where damping crosses the eigenvectors, and nothing turns them: not even keys.
+  // Makes crossed modes, if damping is not proportional and nothing changes the coefficients.
   bool cross() {
     if (!is_untuned_) {
       return false;
@@ -202,7 +206,7 @@ class ModesFinder {
     }
     crossed_ = *std::move(crossed);
     modes_.is_crossed = true;
-    modes_.silence = 0.0;  // they are no oscillators whose amplitudes could be told
+    modes_.silence = 0.0;  // Their amplitudes have no such bound.
     return true;
   }
 
@@ -356,7 +360,7 @@ class ModesFinder {
     return rest;
   }
 
-  // Modes that nothing hears are as good as not there. Any other may be struck.
+  // Drops modes that no output and no link reads. All others may be excited.
   void drop_idle_modes() {
     const auto matters = [](const std::vector<Vector>& rows, std::uint32_t i) {
       return std::any_of(rows.begin(), rows.end(), [&](const Vector& row) {
@@ -369,7 +373,7 @@ class ModesFinder {
       }
     }
     if (has_force_output()) {
-      modes_.silence = 0.0;  // there is no bound for what a force swings by
+      modes_.silence = 0.0;  // There is no bound for outputs that are forces.
     }
     const bool is_driven =
         !pushed_.empty() || !modes_.places.empty() || largest(q_) > 0.0 || largest(d_) > 0.0;
@@ -402,7 +406,7 @@ class ModesFinder {
     }
   }
 
-  // What all stiffnesses or dampings give to each mode, at the start.
+  // Returns the stiffness or damping of each mode at the start.
   Vector sum_of(const std::vector<Frame>& frames) const {
     const double w = body_.weight();
     Vector sum = Vector(count_);
@@ -412,7 +416,7 @@ class ModesFinder {
     return sum;
   }
 
-  // Most of the budget is for modes that sleep: these cost nothing either.
+  // Leaves out modes. Most of the budget is kept for modes that sleep, which cost nothing either.
   void leave_out() {
     Vector stiffness = sum_of(stiffness_);
     Vector damping = sum_of(damping_);
@@ -444,8 +448,8 @@ class ModesFinder {
     give_at_holds(worth.left_out, all, flexible);
   }
 
-  // How far the modes that are left out let the ends of a link give way, per force, with the
-  // stiffness of the first frame.
+  // Computes the static compliance of the ends of links by the modes that are left out (residual
+  // flexibility), relative to the stiffness of the first frame.
   void give_at_holds(const std::vector<std::uint32_t>& left_out,
                      const std::vector<std::uint32_t>& all, const Vector& stiffness) {
     if (left_out.empty() || stiffness_.empty()) {

@@ -1,11 +1,10 @@
-// core/kernels: passive links (passive.h) on the modes of a ModalState; a part of modal_step.cpp,
-// which alone includes it.
+// core/kernels: passive links (passive.h) on the modes of a ModalState. A part of modal_step.cpp.
 //
-// A push between the ends of one link moves those of another by the sum over all modes of the
-// products of their shapes: `gamma`, by which the links are solved among themselves before the
-// modes are touched. What modes that are left out give way counts as one mode more of each link,
-// which is where its force has pushed it a sample later and forgets it in the next: lK = lZ = 1,
-// 4 - lK - 2 lZ > 0. So with that, too, no link gains energy.
+// A unit push between the ends of one link changes the distance of another link's ends by the sum
+// over all modes of the products of their shapes. This is the matrix `gamma` (the compliance in one
+// sample, a Schur complement): the links are solved with it before the modes move. The compliance
+// of the modes that are left out counts as one more mode of each link, which follows its force one
+// sample later: lK = lZ = 1, so 4 - lK - 2 lZ > 0 and no link gains energy with it either.
 #pragma once
 
 #include "core/kernels/modal/modal_sleep.h"
@@ -15,7 +14,7 @@
 namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
-// How a push moves what: for masses of 1/w of the relative mass of each.
+// Computes the displacement of each listener and link by a unit push of each link, for w = 1.
 template <bool Crossed, class T>
 void measure_replies(ModalState<T>& s, std::size_t places, std::size_t outputs) {
   for (std::size_t l = 0; l < places + outputs; ++l) {
@@ -42,7 +41,8 @@ void measure_replies(ModalState<T>& s, std::size_t places, std::size_t outputs) 
   }
 }
 
-// What passive.h asks: a link is its own first end, and has no other.
+// The interface that passive.h needs. Here the first end of a link is its own number; it has no
+// second.
 template <class T>
 struct ModalBody {
   CoefficientView<T> coefficients() const { return {s.ramps.value}; }

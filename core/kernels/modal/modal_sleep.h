@@ -1,18 +1,17 @@
-// core/kernels: modes that are no longer heard; a part of modal_step.cpp, which alone includes it.
+// core/kernels: modes that are no longer audible sleep. A part of modal_step.cpp.
 //
-// A mode that is left alone rings as q = A r^n cos(...), with r^2 = 1 - lZ and
+// A free mode rings as q = A r^n cos(...), with r^2 = 1 - lZ and
 //   A^2 = (lK q^2 + (lZ - lK) q d + (1 - lZ) d^2) (1 - lZ) / (lK - (lK + lZ)^2 / 4),
-// so that it never again moves a listener, an output or a place that links hold, by more than
-// |shape| A. The loudness of an output is its peak, as it was heard until now. That of a place,
-// which nobody hears, is what so many modes give it in the mean, the root of the sum of half the
-// squares, now or lately. Both are forgotten as a room forgets in which a sound dies away in a
-// second.
+// so it never again moves a listener (an output, or a place that links hold) by more than |shape|
+// A. The loudness of an output is its peak until now. The loudness of a place, which is no output,
+// is the RMS value of its modes, the root of the sum of half the squares, now or lately. Both decay
+// by 60 dB per second.
 //
-// Once in a while the modes are looked at from the one that dies first. As long as all that
-// sleep can move no listener by more than the share `silence` of its loudness, the next one falls
-// asleep: its state is dropped. What was dropped is owed: it goes on decaying in `debt`, awake or
-// asleep, and counts in that sum. So the error at a listener is never more than its sum of |shape|
-// debt. Whatever acts on the modes wakes all of them, in its own sample.
+// The modes are checked at intervals, the one that decays fastest first. A mode falls asleep, and
+// its state is set to 0, as long as all dropped modes together cannot move any listener by more
+// than the share `silence` of its loudness. The amplitude that was dropped stays in `debt` and
+// decays there, whether the mode sleeps or not. So the error at a listener never exceeds its sum of
+// |shape| debt. Every force on the modes wakes all of them in the same sample.
 #pragma once
 
 #include "core/kernels/modal/modal_sweep.h"
@@ -20,17 +19,17 @@
 namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
-// r^2 to this power is r^check_frames.
+// Squaring r^2 this many times gives r^check_frames.
 constexpr std::size_t check_doublings = 4;
 static_assert(std::size_t{2} << check_doublings == check_frames);
 constexpr std::size_t long_check_doublings = 2;
 static_assert(check_frames << long_check_doublings == long_check_frames);
 constexpr std::size_t few_modes = 16;
 
-constexpr double least_ringing = 1e-4;  // share of lK; nearer to the aperiodic limit nothing sleeps
-constexpr double endless = 1e15;        // the amplitude of what does not ring, for a state of 1
+constexpr double least_ringing = 1e-4;  // share of lK; modes nearer to critical damping never sleep
+constexpr double endless = 1e15;        // amplitude of a mode that does not ring, for a state of 1
 
-// What is left, after an interval as long as the last, of what a short one leaves `kept` of.
+// Returns the decay in an interval as long as the last one, from the decay `kept` in a short one.
 template <class V, class T>
 V after_check(const ModalState<T>& s, V kept) {
   for (std::size_t i = 0; s.sleep.is_long_check && i < long_check_doublings; ++i) {
@@ -45,8 +44,8 @@ const T* listener(const ModalState<T>& s, std::size_t places, std::size_t l) {
                     : s.shapes.outputs + (l - places) * s.shapes.row;
 }
 
-// How the modes ring, with the coefficients of now. Where a stiffness has fallen, what is owed
-// swings wider.
+// Updates the ringing of the modes from the current coefficients. If a stiffness has fallen, the
+// amplitudes in `debt` grow.
 template <class T>
 void measure_ringing(ModalState<T>& s) {
   using V = ModePack<T>;
@@ -89,7 +88,7 @@ void measure_amplitudes(ModalState<T>& s) {
   }
 }
 
-// What may still be dropped at each listener.
+// Computes the amplitude that may still be dropped at each listener.
 template <class T>
 void measure_room(ModalState<T>& s, std::size_t places, std::size_t listeners) {
   using V = ModePack<T>;
@@ -107,7 +106,7 @@ void measure_room(ModalState<T>& s, std::size_t places, std::size_t listeners) {
     const T now = std::sqrt(total<T>(loud) / 2);
     const T lately = after_check(s, s.sleep.lately_kept) * s.sleep.loudness[l];
     s.sleep.loudness[l] = now > lately ? now : lately;
-    // The peak without what sleeps may be less by what is missing.
+    // The measured peak may be too small by the share that sleeps.
     const T share = s.sleep.silence * (1 - s.sleep.silence);
     const T room = share * s.sleep.loudness[l] - total<T>(owed);
     s.sleep.room[l] = room > 0 ? room : T(0);
@@ -134,7 +133,7 @@ void stay_awake(ModalState<T>& s, std::size_t modes) {
   s.sleep.swept = (modes + unit - 1) / unit * unit;
 }
 
-// What has decayed enough falls asleep. The modes are left alone at this time.
+// Puts modes to sleep that have decayed enough. No force may act on the modes at this time.
 template <class T>
 void check_sleep(ModalState<T>& s, std::size_t places, std::size_t listeners) {
   for (std::size_t i = 0; i < all_packs(s); ++i) {

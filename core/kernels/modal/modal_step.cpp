@@ -1,4 +1,4 @@
-// The modal kernel's way through a block, compiled for each instruction set.
+// The modal kernel's computation of a block, compiled for each instruction set.
 #include "core/kernels/modal/modal_bounds.h"
 #include "core/kernels/modal/modal_exact.h"
 #include "core/kernels/modal/modal_passive.h"
@@ -8,9 +8,13 @@
 namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
-constexpr std::uint32_t frames_after_touch = 256;  // until a free motion is tried again
+constexpr std::uint32_t frames_after_touch =
+    256;  // from a contact until a free block is tried again
 constexpr std::uint32_t nowhere = 0xffffffffu;
 
+// Computes one block: divides it into parts with constant and with changing coefficients, decides
+// for each part which links can act, and advances the modes sample by sample (bound) or in runs
+// (free).
 template <class T, bool Crossed>
 struct ModalPlayer {
   const Modes& modes;
@@ -22,7 +26,7 @@ struct ModalPlayer {
   const std::size_t outputs = modes.outputs.size();
   const std::size_t inputs = program.inputs.size();
 
-  // Parts in which every sample moves the coefficients, or none does.
+  // Plays the block in parts in which the coefficients change in every sample, or in none.
   void play() {
     for (std::size_t at = 0; at < block.frames;) {
       const std::size_t left = block.frames - at;
@@ -47,7 +51,7 @@ struct ModalPlayer {
     }
   }
 
-  // Lets modes sleep that are neither pushed nor held after frame `last`.
+  // Puts modes to sleep if no input and no link acts after frame `last`.
   void settle(std::size_t last, std::size_t frames) {
     s.sleep.until_check -=
         frames < s.sleep.until_check ? static_cast<std::uint32_t>(frames) : s.sleep.until_check;
@@ -83,7 +87,7 @@ struct ModalPlayer {
     }
   }
 
-  // What acts on the modes from outside in this sample.
+  // Computes the amplitude of each push in a sample.
   void fill_amplitudes(std::size_t frame) {
     const T w = inverse_mass();
     const T* const value = block.value + frame * inputs;
@@ -128,8 +132,9 @@ struct ModalPlayer {
 
   // --- sample by sample -----------------------------------------------------------------------
 
-  // Only the links that can act with twice the norm are looked at, what links bring in being as in
-  // the last block; if it becomes more than that, the block is played again with all.
+  // Computes a part in which links act. Assumes that the links add to the norm of the modes what
+  // they added in the last block, and computes only the links that can act within twice that norm.
+  // If the norm exceeds it, the part is computed again with all links.
   void play_touched(std::size_t first, std::size_t frames) {
     const T norm = greatest_norm(first, frames);
     const T most = 2 * (norm + s.ends.kick_norm);
@@ -208,7 +213,8 @@ struct ModalPlayer {
     }
   }
 
-  // Crossed modes are placed a sample ahead: until then a place is where it was put.
+  // The state of crossed modes is one sample ahead at first. Until then a place stays where
+  // set_state() has put it.
   void locate_at_first(std::uint32_t p) {
     if (!Crossed || *s.motion.used != 0) {
       locate(p);
@@ -223,7 +229,7 @@ struct ModalPlayer {
     }
   }
 
-  // The rows of a sample's sweep: places, pushes that push, and outputs.
+  // Chooses the rows of a sample's sweep: places, pushes that are not 0, and outputs.
   template <bool Moving>
   void choose_rows() {
     if (Moving) {
@@ -245,7 +251,7 @@ struct ModalPlayer {
       bundle<Crossed>(s, s.held.places + s.inputs.pushing + heard_along());
     }
   }
-  // How many outputs a sweep takes along; the others have sweeps of their own.
+  // Returns how many outputs a sweep computes. The others are summed one by one.
   std::size_t heard_along() const { return outputs < 2 ? outputs : 2; }
 
   void move_modes(std::size_t n) {
@@ -294,7 +300,7 @@ struct ModalPlayer {
     }
   }
 
-  // The plain links that are not linear; whether any acts.
+  // Computes the forces of plain links for the next sample. Returns whether any is not 0.
   bool act() {
     bool acts = false;
     const Ends* ends = s.held.ends;
@@ -336,7 +342,7 @@ struct ModalPlayer {
     }
   }
 
-  // What links and inputs exert at a node, once all has moved and pulled.
+  // Returns the force of links and inputs at a node, after all links have been computed.
   T force_of(const ModalForce& force, std::size_t number, std::size_t n) const {
     const T* const row = s.forces.rows + 2 * number * s.shapes.stride;
     T sum = s.forces.still[number] +
@@ -358,9 +364,10 @@ struct ModalPlayer {
     return static_cast<T>(force.scale) * sum;
   }
 
-  // --- as long as nothing touches -------------------------------------------------------------
+  // --- free motion ----------------------------------------------------------------------------
 
-  // The whole block, a few samples at a time, if no link acts in it; else nothing has happened.
+  // Computes the part a few samples at a time. Returns false, with the state as before, if a link
+  // acts in it.
   bool play_free(std::size_t first, std::size_t frames) {
     std::size_t rows = 0;
     for (std::size_t o = 0; o < outputs; ++o) {
@@ -387,7 +394,7 @@ struct ModalPlayer {
     return true;
   }
 
-  // Adds the places to the rows whose links may act. False where one acts for sure.
+  // Adds the places to the rows whose links may act. Returns false if a link acts in any case.
   bool find_suspects(std::size_t first, std::size_t frames, std::size_t& rows) {
     for (std::size_t p = 0; p < places; ++p) {
       s.held.row_of[p] = nowhere;
@@ -416,7 +423,7 @@ struct ModalPlayer {
     }
   }
 
-  // After a free motion: whether it met no link.
+  // Returns whether the free motion met no link.
   bool is_untouched(std::size_t first, std::size_t frames) const {
     const auto is_seen = [&](std::uint32_t end) {
       return end >= places || s.held.row_of[end] != nowhere;
@@ -462,7 +469,7 @@ struct ModalPlayer {
         return run_heard<2>(first, frames, rows);
     }
   }
-  // As many samples at a time as there are registers for what is heard in them.
+  // Computes as many samples at a time as there are registers for the rows.
   template <std::size_t Kicked>
   void run_heard(std::size_t first, std::size_t frames, std::size_t rows) {
     if (rows <= 1) {
@@ -532,7 +539,7 @@ struct ModalPlayer {
       s.sleep.is_long_check = false;
     }
   }
-  // Whether a link has pulled in the last sample.
+  // Returns whether a link exerted a force in the last sample.
   bool is_held() const {
     for (std::size_t p = 0; p < places; ++p) {
       if (s.ends.force[p] != 0) {
@@ -542,7 +549,7 @@ struct ModalPlayer {
     return s.passive.is_pushed;
   }
 
-  // --- where things can be --------------------------------------------------------------------
+  // --- positions and their bounds -------------------------------------------------------------
 
   T position_of(std::uint32_t end, std::size_t n) const {
     const ModalEnd& other = modes.ends[end - places];
@@ -550,7 +557,7 @@ struct ModalPlayer {
                          : static_cast<T>(program.position[other.node]);
   }
 
-  // What is no mass takes its place.
+  // Moves the ends that follow a position input.
   void move_ends(std::size_t n) {
     for (std::size_t i = 0; i < modes.ends.size(); ++i) {
       if (modes.ends[i].follows) {
@@ -560,7 +567,7 @@ struct ModalPlayer {
     }
   }
 
-  // The norm that the modes have at most in this block, without what links do.
+  // Returns a bound on the norm of the modes in this part, without the forces of links.
   T greatest_norm(std::size_t first, std::size_t frames) const {
     T norm = std::sqrt(energy(s));
     for (std::size_t j = 0; j < pushes; ++j) {
@@ -573,7 +580,7 @@ struct ModalPlayer {
     return norm;
   }
 
-  // Where an end can be in a block, and in the two samples before it.
+  // Returns the range of positions of an end in this part and in the two samples before it.
   Range<T> range_of(std::uint32_t end, std::size_t first, std::size_t frames, T norm) const {
     if (end < places) {
       const T reach = T(1.001) * norm * std::sqrt(s.ends.compliance[end]);
@@ -597,9 +604,9 @@ struct ModalPlayer {
     return may_act<T>(run, s.ramps.value, {at.low - to.high, at.high - to.low});
   }
 
-  // --- what is computed -----------------------------------------------------------------------
+  // --- choice of links ------------------------------------------------------------------------
 
-  // Everything that a block may change, but for what is counted.
+  // Saves and restores the state that a part may change, except for its counters.
   void save() {
     s.saved.awake = s.sleep.awake;
     keep(s, s.saved.q, s.motion.q);
@@ -632,7 +639,7 @@ struct ModalPlayer {
              may_act_within(run, a, b, first, frames, norm);
     });
   }
-  // Chooses the links that are computed and the places that they need.
+  // Chooses the links to compute and the places that they need.
   template <class Condition>
   void hold_if(Condition&& condition) {
     std::fill_n(s.held.row_of, places, nowhere);
@@ -664,7 +671,7 @@ struct ModalPlayer {
         }
       }
     }
-    // One alone, or all of them at once by what each moves the others.
+    // A single passive link is solved alone, several together.
     const std::size_t active = s.passive.active->links.size();
     s.passive.active->alone = active == 1 ? 1 : 0;
     s.passive.active->clusters[0].count = active == 1 ? 0 : static_cast<std::uint32_t>(active);
@@ -689,22 +696,22 @@ struct ModalPlayer {
 
   bool presses() const { return !s.passive.active->links.empty(); }
 
-  // Whether what passive links push may wait for the next sample's sweep: where that kicks nothing
-  // else, and nobody looks at the modes before.
+  // Returns whether the displacements by passive links may be added in the next sample's sweep.
+  // That sweep must have no other kicks, and nothing may read the modes before.
   bool may_shove_later() const {
     const bool is_all = std::all_of(s.held.count_of, s.held.count_of + modes.holds.size(),
                                     [](std::uint32_t plain) { return plain == 0; });
     return presses() && is_all && s.inputs.pushing == 0 && s.forces.count == 0 &&
            s.held.places <= most_kicked;
   }
-  // What has waited.
+  // Adds displacements that were deferred.
   void shove_now() {
     if (std::exchange(s.passive.shoves_later, false)) {
       shove_rows<Crossed>(s);
     }
   }
 
-  // As a run of samples begins, or in each whose coefficients move.
+  // Updates the matrices at the start of a part, or in each sample with changing coefficients.
   void measure_passive() {
     if (s.passive.is_reply_stale) {
       measure_replies<Crossed>(s, places, outputs);
@@ -721,8 +728,8 @@ struct ModalPlayer {
     remember(*s.passive.active, s.passive.memory, ModalBody<T>{s, inverse_mass()});
   }
 
-  // Once everything else has moved: finds what the links push with, and moves places, what is heard
-  // and the modes. Gives whether any pushes.
+  // Solves the passive links after everything else has moved. Moves places, outputs and modes by
+  // their forces. Returns whether any force is not 0.
   bool press() {
     const T w = inverse_mass();
     T* row = s.passive.memory;
@@ -731,7 +738,7 @@ struct ModalPlayer {
       const auto [a, b] = s.passive.links[i].ends;
       s.passive.opening[i] = s.ends.x[a] - s.ends.x[b];
       s.passive.rush[i] = s.ends.v[a] - s.ends.v[b] - s.passive.yield[i];
-      row[2] = s.passive.pushed[i];  // where looking for it begins
+      row[2] = s.passive.pushed[i];  // initial value of the solver
       row += passive_rows;
     }
     ModalBody<T> body{s, w};
@@ -764,7 +771,7 @@ struct ModalPlayer {
     return pushes;
   }
 
-  // How far all pushes move a listener.
+  // Returns the displacement of a listener by all passive links.
   T moved(std::size_t listener) const {
     T sum = 0;
     for (const PassiveLink& link : s.passive.active->links) {
@@ -801,7 +808,7 @@ struct ModalPlayer {
     return modes.inverse_mass == Modes::own_mass ? T(1) : coefficient(modes.inverse_mass);
   }
 
-  // For how many samples from now on the modes are not what they were in the sample before.
+  // Returns the number of samples, from now on, in which the coefficients change.
   std::size_t moving_frames() const {
     if (s.ramps.frames > 0) {
       return s.ramps.frames;
@@ -817,7 +824,7 @@ struct ModalPlayer {
     return is_same && *used == inverse_mass() ? 0 : 1;
   }
 
-  // A coefficient some samples from now.
+  // Returns a coefficient some samples ahead.
   T coefficient(std::uint32_t c, std::size_t ahead) const {
     for (std::size_t i = 0; ahead > 0 && i < s.ramps.count; ++i) {
       if (s.ramps.ramping[i] == c) {
@@ -829,12 +836,12 @@ struct ModalPlayer {
     return coefficient(c);
   }
 
-  // lK and lZ, some samples from now.
+  // Computes lK and lZ some samples ahead.
   void mix(std::size_t ahead, T* k, T* z) {
     const T w =
         modes.inverse_mass == Modes::own_mass ? T(1) : coefficient(modes.inverse_mass, ahead);
     if constexpr (Crossed) {
-      // Placed a sample ahead, in the first one nothing moves them but what pushes.
+      // Their initial state is that of the first sample, in which only pushes move them.
       s.motion.is_first = *s.motion.used == 0;
       const T here = s.motion.is_first ? T(0) : T(1);
       for (std::size_t i = 0; i < all_packs(s); ++i) {
@@ -872,7 +879,7 @@ struct ModalPlayer {
     return used;
   }
 
-  // The rows by which forces are felt, with the coefficients of now.
+  // Computes the rows of outputs that are forces, from the current coefficients.
   void mix_forces() {
     std::size_t force = 0;
     for (const ModalOutput& output : modes.outputs) {
@@ -884,7 +891,7 @@ struct ModalPlayer {
       T still = 0;
       for (const ModalForce::Part& part : output.force.parts) {
         const T c = coefficient(part.coefficient);
-        // Of crossed modes both rows are the two parts of one, dampers by the speed's own shape.
+        // Crossed modes have one row of two parts; dampers use the shape of velocities.
         for (std::size_t i = 0; i < part.shape.size(); ++i) {
           const std::size_t mode = i % modes.modes;
           const bool is_second = Crossed ? i >= modes.modes : part.is_damping;
@@ -898,8 +905,8 @@ struct ModalPlayer {
     }
   }
 
-  // Between here and some samples on exact coefficients move in a straight line: gives how many.
-  // What has just been placed is pulled by nothing in its first sample.
+  // Interpolates the exact coefficients linearly over `frames` samples. Returns the number of
+  // samples, which is 1 just after set_state(), as links exert no force in the first sample.
   std::size_t begin_exact(std::size_t frames) {
     frames = s.motion.fresh_frames < 2 ? 1 : frames;
     s.motion.fresh_frames += s.motion.fresh_frames < 2;

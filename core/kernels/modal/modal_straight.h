@@ -1,13 +1,13 @@
-// core/kernels: passive links on a ModalState in a sample in which none of them comes to an edge; a
-// part of modal_step.cpp, which alone includes it.
+// core/kernels: passive links on a ModalState in a sample in which none passes an edge of its law.
+// A part of modal_step.cpp.
 //
-// A contact that stays inside is a spring and a damper, and what stays outside is nothing: a link
-// then exerts f = value + slope s for a step s = free - C f, so that of all of them
+// A contact that stays inside is a spring and a damper, and one that stays outside exerts no force.
+// A link then exerts f = value + slope s for a step s = free - C f, so all links together satisfy
 //
 //   (I + S C) f = value + S free,  S: the slopes,  C: `gamma`
 //
-// whose matrix is the same from sample to sample, and its inverse with it. What that gives is held
-// to what joint.h asks for; where it fails, or an edge is passed, they are solved as any others.
+// The matrix is constant from sample to sample, so its inverse is kept. The result has to meet the
+// condition of joint.h. If it does not, or if an edge is passed, the general solver is used.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,7 @@
 namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
-// How deep inside its zone a link is; positive where it acts.
+// Returns the depth of a distance inside a zone. It is positive where the link acts.
 template <class T>
 T depth_of(Zone zone, T reach, T d) {
   return zone == Zone::below ? d + reach : reach - absolute(d);
@@ -29,13 +29,14 @@ struct StraightLink {
   Zone zone;
   T reach;
   T before;  // the distance a sample ago
-  T free;    // the step if no link acted
-  T value;   // what it exerts without a step
-  T slope;   // and more for each unit of it
+  T free;    // change of the distance if no link acted
+  T value;   // force without a change of the distance
+  T slope;   // force per change of the distance
   bool is_inside;
 };
 
-// Nothing that is straight is known of a law that always acts, or is bent inside.
+// Linearises a link. Returns false if its law always acts, if it is curved inside, or if the link
+// passes an edge.
 template <class T>
 bool find_straight(const PassiveLink& passive, const laws::LinkState<T>& state,
                    const T* coefficient, StraightLink<T>& link) {
@@ -67,8 +68,8 @@ bool find_straight(const PassiveLink& passive, const laws::LinkState<T>& state,
   });
 }
 
-// [by][of] how the links that are computed move each other, the inverse, and the slopes of S: each
-// in whole packs.
+// The matrices `gamma` and (I + S C)^-1 of the active links, column by column in whole packs, and
+// the slopes S.
 template <class T>
 struct StraightMatrices {
   explicit StraightMatrices(const ModalState<T>& s)
@@ -79,7 +80,7 @@ struct StraightMatrices {
         inverse(coupling + count * stride),
         slope(inverse + count * stride) {}
 
-  // Sums up columns, each times its number.
+  // Multiplies a matrix by a vector: the sum of columns, each times a number.
   void multiply(const T* columns, const T* numbers, T* sums) const {
     for (std::size_t pack = 0; pack < packs; ++pack) {
       ModePack<T> sum{};
@@ -111,7 +112,7 @@ void invert_straight(ModalState<T>& s, const StraightMatrices<T>& m, const Strai
       m.inverse[j * m.stride + i] = (i == j ? T(1) : T(0)) + m.slope[i] * moved;
     }
   }
-  for (std::size_t k = 0; k < m.count; ++k) {  // Gauss and Jordan; no pivot is less than 1
+  for (std::size_t k = 0; k < m.count; ++k) {  // Gauss-Jordan elimination; no pivot is less than 1
     T* const column = m.inverse + k * m.stride;
     const T pivot = 1 / std::exchange(column[k], T(1));
     for (std::size_t i = 0; i < m.count; ++i) {
@@ -130,7 +131,8 @@ void invert_straight(ModalState<T>& s, const StraightMatrices<T>& m, const Strai
   s.passive.is_straight_stale = false;
 }
 
-// Fills s.passive.pushed. False where it is not so simple: nothing has happened.
+// Solves the links and fills s.passive.pushed. Returns false, without changes, if an edge is passed
+// or the result is not accurate enough.
 template <class T, class Body>
 bool push_straight(ModalState<T>& s, const Body& body) {
   const std::vector<PassiveLink>& active = s.passive.active->links;

@@ -1,5 +1,4 @@
-// core/kernels: the sweeps over the modes of a ModalState; the inner part of modal_step.cpp, which
-// alone includes it.
+// core/kernels: the passes over all modes of a ModalState. A part of modal_step.cpp.
 #pragma once
 
 #include <utility>
@@ -9,12 +8,12 @@
 namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
-constexpr std::size_t most_kicked = 8;  // rows that one sweep takes along
+constexpr std::size_t most_kicked = 8;  // rows of one sweep
 constexpr std::size_t most_heard = 8;
 constexpr std::size_t most_shoved = 4;
 
 template <bool Crossed>
-constexpr std::size_t parts = Crossed ? 2 : 1;  // of each number of a shape
+constexpr std::size_t parts = Crossed ? 2 : 1;  // numbers per mode of a shape
 
 template <class T>
 using ModePack = Pack<T, vector_bytes(Isa::RESSORT_ISA)>;
@@ -38,7 +37,8 @@ std::size_t all_packs(const ModalState<T>& s) {
   return s.shapes.modes / mode_lanes<T>;
 }
 
-// By halves: one lane after the other would take as long as the rest of a short sweep.
+// Returns the sum of the lanes, by halves: adding lane after lane would take as long as the rest of
+// a short sweep.
 template <class T, std::size_t Bytes = vector_bytes(Isa::RESSORT_ISA)>
 T total(Pack<T, Bytes> sum) {
   if constexpr (Bytes > 16) {
@@ -62,14 +62,14 @@ T along(const ModalState<T>& s, const T* row, const T* numbers) {
   return total<T>(even + odd);
 }
 
-// Where a row's place is, or what moves like one: of crossed modes the real part of a product.
+// Returns the displacement along a row; for crossed modes, the real part of the product.
 template <bool Crossed, class T>
 T read(const ModalState<T>& s, const T* row) {
   const T even = along(s, row, s.motion.q);
   return Crossed ? even - along(s, row + s.shapes.stride, s.motion.d) : even;
 }
 
-// How far a push of 1 along one row moves what another reads.
+// Returns the displacement along one row by a unit push along another.
 template <bool Crossed, class T>
 T reply(const ModalState<T>& s, const T* one, const T* other) {
   ModePack<T> sum{};
@@ -89,8 +89,8 @@ void keep(const ModalState<T>& s, T* to, const T* from) {
   }
 }
 
-// Lays the rows that a sweep needs side by side, pack by pack and part by part; null is a row of
-// zeros.
+// Interleaves the rows of a sweep, [pack][row][part], so that the sweep reads memory in one stream.
+// Null is a row of zeros.
 template <bool Crossed, class T>
 void bundle(ModalState<T>& s, std::size_t rows) {
   bool is_same = rows == s.sweep.bundled && s.sleep.swept <= s.sweep.bundled_modes;
@@ -115,10 +115,13 @@ void bundle(ModalState<T>& s, std::size_t rows) {
   }
 }
 
-// All modes through a few samples. Of the bundled rows the first are kicked by s.sweep.kick
-// [sample][row] and, if Felt, give their speed to s.sweep.speed [row], of one sample; the others
-// give their position to s.sweep.heard [sample][row]. If Shoved, the kicks are those by which
-// passive links have moved the modes at the end of the sample before.
+// Advances all modes by `Samples` samples. Each mode is an oscillator stepped by symplectic Euler:
+//   d[n+1] = d[n] - lZ d[n] - lK q[n] + kicks,   q[n+1] = q[n] + d[n+1]
+// or, if Crossed, y[n+1] = y[n] + (pole - 1) y[n] + kicks for y = q + i d.
+// The first `Kicked` rows of the bundle add s.sweep.kick [sample][row] and, if Felt, return their
+// velocity in s.sweep.speed [row]. The next `Heard` rows return their displacement in s.sweep.heard
+// [sample][row]. If Shoved, the kicks are the displacements by passive links at the end of the
+// sample before, which are added to q and d alike.
 template <std::size_t Samples, std::size_t Kicked, bool Felt, std::size_t Heard, bool Crossed,
           bool Shoved, class T>
 void sweep(ModalState<T>& s) {
@@ -152,8 +155,8 @@ void sweep(ModalState<T>& s) {
     const V zi = z[i];
 #pragma GCC unroll 16
     for (std::size_t n = 0; n < Samples; ++n) {
-      // The kicks in two sums, which wait for nothing; q and d wait for each other. Those of
-      // crossed modes are of their two parts.
+      // Two sums of the kicks, to hide their latency: q and d depend on each other. Crossed modes
+      // have a sum for each part.
       V f[2] = {};
 #pragma GCC unroll 16
       for (std::size_t r = 0; r < Kicked; ++r) {
@@ -216,7 +219,7 @@ void sweep(ModalState<T>& s) {
   }
 }
 
-// One sample, for up to most_kicked rows that are kicked and felt, and two that are heard.
+// Advances by one sample, with up to most_kicked rows that are kicked and two that are heard.
 template <std::size_t Heard, bool Crossed, bool Shoved, class T>
 void sweep_sample(ModalState<T>& s, std::size_t kicked) {
   switch (kicked) {
@@ -252,15 +255,14 @@ void sweep_sample(ModalState<T>& s, std::size_t kicked, std::size_t heard) {
   }
 }
 
-// The same for any number of rows, one by one.
+// The following do the same for any number of rows, one by one.
 template <class T>
 void kick_row(const ModalState<T>& s, T* load, const T* row, T kick) {
   for (std::size_t i = 0; kick != 0 && i < pack_count(s); ++i) {
     packs(load)[i] += kick * packs(row)[i];
   }
 }
-// Adds s.passive.shove along some rows of places to the modes; what is beyond the last adds
-// nothing.
+// Adds s.passive.shove along `Rows` rows of places to q and d. Rows beyond the last add 0.
 template <bool Crossed, std::size_t Rows, class T>
 void shove_some(ModalState<T>& s, std::size_t first) {
   using V = ModePack<T>;

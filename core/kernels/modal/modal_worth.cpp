@@ -8,18 +8,18 @@
 namespace ressort::kernels {
 namespace {
 
-constexpr double least_ringing = 1e-4;  // share of lK: nearer to the aperiodic limit
+constexpr double least_ringing = 1e-4;  // share of lK; modes nearer to critical damping do not ring
 constexpr double never = std::numeric_limits<double>::infinity();
-constexpr double most_work = 1e7;  // to find peaks
+constexpr double most_work = 1e7;  // operations for the peaks
 constexpr std::size_t least_samples = 128;
 constexpr std::size_t most_samples = 4096;
 
 using Row = std::vector<double>;
 
-// How a mode rings: q = A r^n cos(...).
+// The free motion of a mode, q = A r^n cos(...).
 struct Ring {
   bool rings = false;
-  double swing = 0.0;  // A of a blow of 1
+  double swing = 0.0;  // A for a unit impulse
   double kept = 0.0;   // r
 };
 
@@ -32,7 +32,7 @@ Ring ring_of(double k, double z) {
   return {true, std::sqrt((1.0 - z) / depth), std::sqrt(1.0 - z)};
 }
 
-// What `steps` samples make of a mode's q and d.
+// The matrix that advances q and d of a mode by some samples.
 struct Advance {
   static Advance of(double k, double z, std::size_t steps) {
     Advance power{1.0, 0.0, 0.0, 1.0};
@@ -57,7 +57,7 @@ class Scales {
       rings_.push_back(ring_of(hearing.stiffness[i], hearing.damping[i]));
     }
     for (const Row& blow : hearing.blows) {
-      const Row peaks = peaks_of(blow, blow);  // as it is a sample later
+      const Row peaks = peaks_of(blow, blow);  // one sample later
       weigh_source([&](std::size_t i) { return rings_[i].swing * std::fabs(blow[i]); }, peaks);
       weigh_source(
           [&](std::size_t i) {
@@ -98,12 +98,12 @@ class Scales {
     return rings_[i].swing * std::sqrt(std::max(square, 0.0));
   }
 
-  // How far the modes, let go with this q and d, have moved each listener at most in some samples:
-  // the first ones, then some as far apart as is needed for half a period of the slowest.
+  // Returns the peak at each listener of the free motion from this q and d. It samples the first
+  // samples, and then at a spacing that reaches half a period of the slowest mode.
   Row peaks_of(Row q, Row d) const {
     const std::size_t modes = rings_.size();
     Row peaks(hearing_.listeners.size(), 0.0);
-    Row ringing_peaks = peaks;  // without what drifts away
+    Row ringing_peaks = peaks;  // without modes that drift
     const auto listen = [&] {
       for (std::size_t l = 0; l < peaks.size(); ++l) {
         double heard = 0.0;
@@ -150,8 +150,9 @@ class Scales {
     return peaks;
   }
 
-  // A source at every listener: each mode's share of its peak there, or without one of all that
-  // ring. Undamped modes ring for ever: where there are any, the sum over time is of no use.
+  // Computes each mode's share of the peak at each pair of a source and a listener. Without a peak,
+  // the share of the sum over all modes that ring. With undamped modes the sum over time diverges
+  // and is not used.
   template <class Swing>
   void weigh_source(Swing&& swing, const Row& peaks) {
     for (std::size_t l = 0; l < hearing_.listeners.size(); ++l) {
@@ -199,7 +200,7 @@ class Scales {
     return rings_[mode].rings;
   }
 
-  // By the time until a mode has fallen to a small part of the budget.
+  // Sorts by the time in which a mode decays to a small part of the budget.
   void sort_by_life(std::vector<std::uint32_t>& modes, const Row& loudness) const {
     const double inaudible = 0.5 * std::min(most_, 1.0);
     Row life(rings_.size(), never);

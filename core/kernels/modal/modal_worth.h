@@ -1,4 +1,5 @@
-// core/kernels: which modes a budget lets a part do without, and how long the others are heard.
+// core/kernels: chooses the modes that a budget of silence leaves out, and sorts the others by the
+// time for which they are audible.
 #pragma once
 
 #include <cstdint>
@@ -9,28 +10,29 @@
 
 namespace ressort::kernels {
 
-// The modes of a part, for masses of 1, as they are at the start.
+// The modes of a part at the start, for masses of 1, and what excites and reads them.
 struct Hearing {
-  std::vector<double> stiffness;               // [mode] lK
-  std::vector<double> damping;                 // [mode] lZ
-  std::vector<std::vector<double>> blows;      // [source][mode] what a blow of 1 adds to the speed
-  std::vector<std::vector<double>> starts;     // {q, d}, as they are at first
-  std::vector<std::vector<double>> listeners;  // [listener][mode] how far a mode of 1 moves it
+  std::vector<double> stiffness;            // [mode] lK
+  std::vector<double> damping;              // [mode] lZ
+  std::vector<std::vector<double>> blows;   // [source][mode] velocity after a unit impulse
+  std::vector<std::vector<double>> starts;  // {q, d} at the start
+  std::vector<std::vector<double>>
+      listeners;  // [listener][mode] displacement per displacement of a mode
 };
 
 struct Worth {
-  std::vector<std::uint32_t> kept;  // modes, those first that are heard the longest
+  std::vector<std::uint32_t> kept;  // modes, those that are audible longest first
   std::vector<std::uint32_t> left_out;
-  // Left out modes move a listener by no more than this share of how far all modes together do: of
-  // the peak that one blow brings, or the start. Of blows in any number at any time, of how far all
-  // could.
+  // Bound on the error of a listener by the modes that are left out. For one impulse and for the
+  // initial state it is relative to the peak of all modes together. For any sequence of impulses it
+  // is relative to the largest possible displacement.
   double share = 0.0;
 };
 
-// Leaves out modes while that share, of every pair of a source and a listener, is at most `most`.
-// Modes that do not ring stay. A peak is looked for in samples of the motion itself, so that it is
-// never taken for more than it is. O(sources * listeners * modes + modes log modes), and at most
-// some 1e7 for the peaks.
+// Leaves out modes while that bound, for every pair of a source and a listener, is at most `most`.
+// Modes that do not ring are kept. Peaks are the largest of some samples of the motion, so they are
+// never overestimated. O(sources * listeners * modes + modes log modes), plus at most about 1e7
+// operations for the peaks.
 Worth weigh(const Hearing& hearing, double most);
 
 }  // namespace ressort::kernels

@@ -56,7 +56,7 @@ bool OversampledKernel<T>::save(std::size_t lane, double* x, double* v) const {
 template <class T>
 void OversampledKernel<T>::strike(std::size_t lane, std::span<const std::uint32_t> nodes,
                                   std::span<const double> changes) {
-  refine_coefficients();  // a voice may be struck before its first step
+  refine_coefficients();  // A voice may be struck before its first step.
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     const double change = changes[i] / static_cast<double>(times_);
     fine_->strike(lane, nodes.subspan(i, 1), {&change, 1});

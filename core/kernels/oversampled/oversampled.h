@@ -1,6 +1,7 @@
-// core/kernels: a Program stepped several times a sample by another kernel, at a finer rate. Forces
-// last for the whole sample, hands go straight to where they will be, and outputs are heard as the
-// last step leaves them: nothing may swing faster than half the coarse rate.
+// core/kernels: a Program stepped several times per sample by another kernel, at a finer rate.
+// Input forces are held for the whole sample and position inputs are interpolated linearly. The
+// output is the position after the last step, without a decimation filter: nothing may oscillate
+// above half the coarse rate.
 #pragma once
 
 #include "core/kernels/kernel.h"
@@ -32,7 +33,7 @@ class OversampledKernel final : public Kernel<T> {
   const Program& program_;
   std::size_t times_;
   std::unique_ptr<Kernel<T>> fine_;
-  std::vector<T> factor_;        // [coefficient] from a sample to a step
+  std::vector<T> factor_;        // [coefficient] factor from a sample to a step
   Aligned<T> value_, velocity_;  // [step][input][lane]
   Aligned<T> audio_;             // [step][audio coefficient][lane]
   Aligned<T> outputs_;           // [step][output][lane]

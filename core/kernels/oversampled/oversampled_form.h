@@ -1,4 +1,4 @@
-// core/kernels: a Program stepped several times a sample, and its tables.
+// core/kernels: the tables of a Program that is stepped several times per sample.
 #pragma once
 
 #include <memory>
@@ -17,10 +17,10 @@ struct Oversampled {
 
 inline constexpr std::uint32_t most_oversampling = 32;
 
-// The same numbers at `times` the rate, in the direct form.
+// Returns the Program at `times` the rate, in the direct form.
 Program oversampled_program(const Program& program, std::uint32_t times);
 
-// Stepped so many times a sample in the form that the finer Program has.
+// Makes the tables from such a Program, which keeps its form.
 Oversampled oversampled_form(Program fine, std::uint32_t times);
 
 double predicted_ns(const Program& program, const Oversampled& form, const Workload& load);
