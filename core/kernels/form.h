@@ -46,7 +46,7 @@ class Form {
     return &tag<Tables>;
   }
 
-  // Whether its coefficients are those of the continuous network instead of the published scheme.
+  // Returns whether its coefficients are those of the continuous network.
   bool is_continuous() const { return is_continuous_; }
 
  private:

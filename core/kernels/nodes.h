@@ -8,8 +8,8 @@
 
 namespace ressort::kernels {
 
-// Where the numbers of a node are: its position in a lane is at node[i] + lane[j]. Its velocity,
-// its force and further numbers of the kernel follow at distances of `row`.
+// The memory layout of nodes: the position of a node in a lane is at node[i] + lane[j]. Its
+// velocity, its force and further numbers of the kernel follow at distances of `row`.
 struct NodeLayout {
   static constexpr std::uint32_t nowhere = 0xffffffffu;
 

@@ -3,10 +3,7 @@
 #include <map>
 #include <set>
 
-#include "core/kernels/batch/batch_form.h"
-#include "core/kernels/chains/chains_form.h"
-#include "core/kernels/grid/grid_form.h"
-#include "core/kernels/modal/modal_form.h"
+#include "core/kernels/registry.h"
 #include "tests/support/agreement.h"
 #include "tests/support/comparison.h"
 #include "tests/support/networks/random_network.h"
@@ -23,21 +20,14 @@ using support::RandomNetwork;
 using support::Score;
 using support::show;
 
-template <class Table>
-void add_form(std::vector<std::pair<Method, Form>>& forms, Method method,
-              std::optional<Table> table) {
-  if (table) {
-    forms.emplace_back(method, std::move(*table));
-  }
-}
-
+// Returns the forms of all kernels that can play the Program, that of the direct kernel first.
 std::vector<std::pair<Method, Form>> forms_of(const Program& program) {
   std::vector<std::pair<Method, Form>> forms;
-  forms.emplace_back(Method::direct, Form());
-  add_form(forms, Method::chains, chains_form(program));
-  add_form(forms, Method::modal, modal_form(program));
-  add_form(forms, Method::grid, grid_form(program));
-  add_form(forms, Method::batch, batch_form(program));
+  for (const Method method : methods_for(KernelRow::Use::published)) {
+    if (const auto form = row_of(method).fits({program, Workload{}, Budget{}, Progress{}})) {
+      forms.emplace_back(method, *form);
+    }
+  }
   return forms;
 }
 

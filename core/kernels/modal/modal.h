@@ -66,7 +66,7 @@ struct ModalMotion : ModalMotionPace {
   T* used;    // [share of stiffness, share of damping, mass] coefficient in the last sample
 };
 
-// Which modes are awake, and what those that are asleep may add up to (modal_sleep.h).
+// The number of awake modes, and bounds on the error by those that sleep (modal_sleep.h).
 struct ModalSleepPace {
   std::size_t awake = 0;  // modes [0, awake) are awake
   std::size_t swept = 0;  // the same in whole pairs of packs
@@ -102,7 +102,7 @@ struct ModalSweep : ModalSweepPace {
   T* seen;                 // [row][frame] position, for a block
 };
 
-// What inputs and constant forces do to the modes.
+// Amplitudes of inputs and constant forces.
 struct ModalInputsPace {
   std::size_t pushing = 0;  // pushes that are not 0 in this block
 };
@@ -113,7 +113,7 @@ struct ModalInputs : ModalInputsPace {
   T* late;                 // [push] of the sample before, if it acts late
 };
 
-// Where the ends are, what acts on them, and how far the energy lets them move (modal_bounds.h).
+// Positions of the ends, forces on them, and bounds on their motion (modal_bounds.h).
 template <class T>
 struct ModalEndsPace {
   bool has_bounds = false;

@@ -114,7 +114,7 @@ TEST_CASE("The plan chooses the form with the lowest worst-case cost", "[compile
                              scenes::output(1, "s_m4");
   CHECK(chosen(picked) == Method::batch);
   CHECK(chosen(picked, 64) == Method::batch);
-  CHECK(chosen(scenes::physical_lfo()) == Method::batch);
+  CHECK(chosen(scenes::physical_lfo()) == Method::chains);
   CHECK(chosen(scenes::resonator()) == Method::chains);
   CHECK(chosen(scenes::bowed_string()) == Method::chains);
   CHECK(chosen(scenes::plucked_harmonics()) == Method::chains);
