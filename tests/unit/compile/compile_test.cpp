@@ -112,7 +112,7 @@ TEST_CASE("The plan chooses the form with the lowest worst-case cost", "[compile
   const std::string picked = scenes::string("s", 6, "0.1", "0.01") +
                              "@in1 posInput 0.\n@pick nlPluck @in1 @s_m2 0.05 0.01\n" +
                              scenes::output(1, "s_m4");
-  CHECK(chosen(picked) == Method::batch);
+  CHECK(chosen(picked) == Method::direct);
   CHECK(chosen(picked, 64) == Method::batch);
   CHECK(chosen(scenes::physical_lfo()) == Method::chains);
   CHECK(chosen(scenes::resonator()) == Method::chains);
