@@ -108,8 +108,7 @@ TEST_CASE("An argument that is not finite is refused with its element, line and 
 TEST_CASE("Numbers near the limits of double precision are reported correctly",
           "[stability_check]") {
   CHECK(said_to(ground + "@r spring @g @m 0.1 1e308\n")
-            .find("the damping 1e308 of 'r' is too "
-                  "large to be reckoned with; ") != std::string::npos);
+            .find("the damping 1e308 of 'r' is too large for the analysis") != std::string::npos);
   for (const char* const stiffness : {"1e150", "1e262", "1e308"}) {
     INFO(stiffness);
     CHECK(said_to(ground + "@r spring @g @m " + stiffness + " 0.1\n")
@@ -126,10 +125,9 @@ TEST_CASE("Contacts that may never close, and unproved models, are not refused",
     CHECK(said_to(ground + "@s spring @g @m 0.1 0.1\n@l " + link + "\n").find("stable") ==
           std::string::npos);
   }
-  CHECK(
-      said_to(ground + "@r spring @g @m -0.1\n") ==
-      "there.mdl:3:1: warning: may be unstable: the stiffness -0.1 of 'r' is negative, and motion "
-      "may grow by itself");
+  CHECK(said_to(ground + "@r spring @g @m -0.1\n") ==
+        "there.mdl:3:1: warning: may be unstable: the stiffness -0.1 of 'r' is negative, so motion "
+        "can grow without end");
   // Too large to factorise and above the edge bound; a smaller stiffness is proved.
   const std::string mesh = "@d mesh 201 200 1. ";
   CHECK(said_to(mesh + "0.51 0. 0. 0.\n", {.method = Method::direct}).find(" warning: ") !=
