@@ -57,9 +57,8 @@ TEST_CASE("An unstable model is refused with the name and line of the culprit, o
   CHECK(said_to(ground + "@r spring @g @m 3.9\n") == "");
   const std::string stiff = ground + "@r spring @g @m 5\n";
   CHECK(said_to(stiff) ==
-        "there.mdl:3:1: error: unstable: the stiffness 5 of 'r' must stay below 4; play, render "
-        "and load "
-        "take --force, which fades out what runs away");
+        "there.mdl:3:1: error: unstable: the stiffness 5 of 'r' must stay below 4; pass --force to "
+        "play it anyway");
   CHECK(said_to(stiff, {.force = true}) ==
         "there.mdl:3:1: warning: unstable: the stiffness 5 of 'r' must stay below 4");
   CHECK(
