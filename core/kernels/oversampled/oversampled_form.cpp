@@ -33,7 +33,9 @@ std::string description(const Program&, const Oversampled& form) {
 
 std::uint64_t voice_bytes(const Program& program, const Oversampled& form,
                           std::uint64_t number_bytes) {
-  return voice_bytes(*form.fine, number_bytes) + node_bytes(program, number_bytes);
+  constexpr std::uint64_t numbers_of_coefficient = 3;  // beside those of the finer Program's kernel
+  return voice_bytes(*form.fine, number_bytes) +
+         number_bytes * numbers_of_coefficient * program.coefficients.size();
 }
 
 }  // namespace ressort::kernels
