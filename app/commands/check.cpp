@@ -159,7 +159,7 @@ json scene_json(const Scene& scene, const Compiled& compiled, const Proved& prov
     plan.push_back({{"method", method_name(part.method)},
                     {"masses", part.masses},
                     {"links", part.links},
-                    {"predicted_ns", part.predicted_ns},
+                    {"estimated_ns", part.estimated_ns},
                     {"reason", part.reason}});
     if (part.accuracy) {
       plan.back()["off"] = accuracy_json(*part.accuracy);

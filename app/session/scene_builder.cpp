@@ -11,14 +11,23 @@
 namespace ressort::session {
 namespace {
 
-// Returns true if another compilation may find a cheaper plan. A plan with exact modes is final:
-// inaudible modes are left out, so no other form can continue its state.
+// Returns true if another engine can continue the state of this plan's. Modes leave out inaudible
+// ones, so no other form can continue their state.
+bool can_be_continued(const Plan& plan) {
+  return std::none_of(plan.parts.begin(), plan.parts.end(),
+                      [](const Part& part) { return part.method == Method::modal; });
+}
+
+// Returns true if a compilation with more modes may find a cheaper plan.
 bool may_gain(const Plan& plan) {
-  const auto any = [&](auto&& is_so) {
-    return std::any_of(plan.parts.begin(), plan.parts.end(), is_so);
-  };
-  return any([](const Part& part) { return part.may_gain; }) &&
-         !any([](const Part& part) { return part.method == Method::modal; });
+  return can_be_continued(plan) && std::any_of(plan.parts.begin(), plan.parts.end(),
+                                               [](const Part& part) { return part.may_gain; });
+}
+
+// Returns true if forms that may be cheaper have not been measured.
+bool is_untimed(const Plan& plan) {
+  return std::any_of(plan.parts.begin(), plan.parts.end(),
+                     [](const Part& part) { return part.is_untimed; });
 }
 
 }  // namespace
@@ -95,6 +104,7 @@ SceneBuilder::Prepared SceneBuilder::prepare(const LoadRequest& request, Draft d
   options.force = request.force;
   options.progress = progress;
   options.most_bytes = free_memory_bytes();
+  options.timings = timings_.time ? &recalled_ : nullptr;
   prepared.made_of = {.lets_ring = request.lets_ring,
                       .path = scene.path,
                       .files = std::move(draft.files),
@@ -119,8 +129,7 @@ Result<std::shared_ptr<const Loaded>> SceneBuilder::play(const LoadRequest& requ
   if (!compiled) {
     return compiled.error();
   }
-  const bool is_improvable = may_gain(compiled->plan);
-  if (!is_improvable) {  // else improve() warns
+  if (!may_gain(compiled->plan)) {  // else improve() warns
     if (std::string warning = overload_warning(compiled->plan, compiled->instrument.voices,
                                                options.rate_hz, options.precision);
         !warning.empty()) {
@@ -128,7 +137,9 @@ Result<std::shared_ptr<const Loaded>> SceneBuilder::play(const LoadRequest& requ
     }
   }
   const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
+  const bool is_improvable = may_gain(compiled->plan) || is_untimed(compiled->plan);
   FlightEngine& made_of = prepared.made_of;
+  made_of.forms = forms_of(compiled->plan);
   made_of.has_new_numbers = continues_state && engines_.newest() != nullptr &&
                             can_renumber(engines_.newest()->machine(), compiled->engine->machine());
   if (!made_of.has_new_numbers) {
@@ -181,11 +192,24 @@ void SceneBuilder::improve() {
     return !was_stopped;
   });
   options.most_bytes = free_memory_bytes();
+  options.timings = timings_.time ? &timings_ : nullptr;
   auto compiled = compile_network(source.network, source.preset, options);
+  wisdom_.save();
   if (!compiled) {
     if (was_stopped) {
       improvable_ = source;  // try again, unless another scene is loaded
     }
+    return;
+  }
+  std::vector<std::string> forms = forms_of(compiled->plan);
+  Plan playing = current_.loaded()->plan;
+  if (forms == forms_of(playing)) {
+    current_.set_plan(std::move(compiled->plan));
+    return;
+  }
+  if (!can_be_continued(playing)) {
+    playing.notes.emplace_back("another kernel is measured to be cheaper; the next load takes it");
+    current_.set_plan(std::move(playing));
     return;
   }
   const std::string overload = overload_warning(compiled->plan, compiled->instrument.voices,
@@ -196,6 +220,7 @@ void SceneBuilder::improve() {
   made_of.gain = source.preset.gain;
   made_of.find_gain = false;
   made_of.most_modes = source.options.most_modes;
+  made_of.forms = std::move(forms);
   made_of.lets_ring = made_of.has_new_numbers = false;
   engines_.offer(std::move(compiled->engine), source.network, std::move(made_of),
                  current_.loaded()->instrument.audio_inputs > 0);
@@ -209,9 +234,13 @@ void SceneBuilder::improve() {
 }
 
 void SceneBuilder::measure_parts() {
+  if (!timings_.time) {
+    return;
+  }
   const auto loaded = current_.loaded();
   Plan plan = loaded->plan;
-  measure(plan, *engines_.newest(), options_.compile, loaded->instrument.voices);
+  measure(plan, *engines_.newest(), options_.compile, loaded->instrument.voices, timings_);
+  wisdom_.save();
   current_.set_plan(std::move(plan));
 }
 

@@ -11,6 +11,7 @@
 #include "app/session/engine_supply.h"
 #include "app/session/load_progress.h"
 #include "app/session/watch/scene_watch.h"
+#include "app/session/wisdom.h"
 #include "app/session/work_queue.h"
 #include "core/compile/compile.h"
 
@@ -23,6 +24,10 @@ struct SessionOptions {
   KeyOptions keys;                     // overrides every preset's tuning
   bool watch = false;                  // reload the playing scene when its files change
   bool keeps_flights = false;          // record flights and save them after problems
+  // How forms are measured, and the file that keeps the results. Without the first nothing is
+  // measured, and without the second nothing is kept.
+  decltype(Timings::time) time = {};
+  std::string wisdom_path = {};
 };
 
 // A scene that was read and not yet compiled.
@@ -49,8 +54,9 @@ class SceneBuilder {
                                              const Progress& progress);
   SceneOptions scene_options(const LoadRequest& request, const Progress& progress) const;
 
-  // Compiles the playing scene again with more modes, if it may become cheaper: the first load
-  // limits the time that it takes to find modes. The new engine continues the old one's state.
+  // Compiles the playing scene again, if it may become cheaper: with more modes, for which the
+  // first load limits the time, and with all forms measured that may be the cheapest. If the new
+  // plan has other forms, the new engine continues the old one's state.
   bool can_improve() const { return improvable_.has_value(); }
   void improve();
 
@@ -75,6 +81,13 @@ class SceneBuilder {
   EngineSupply& engines_;
   SceneWatch& watch_;
   std::optional<Improvable> improvable_;
+  Wisdom wisdom_{options_.wisdom_path};
+  Timings recalled_{.time = {},  // of earlier measurements
+                    .recall = [this](const std::string& key) { return wisdom_.recall(key); },
+                    .keep = {}};
+  Timings timings_{.time = options_.time,  // the same, and of new ones
+                   .recall = recalled_.recall,
+                   .keep = [this](const std::string& key, double ns) { wisdom_.keep(key, ns); }};
 };
 
 }  // namespace ressort::session

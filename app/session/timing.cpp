@@ -1,91 +1,55 @@
 #include "app/session/timing.h"
 
+#include <time.h>
+
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <memory>
 #include <vector>
 
 #include "app/realtime/denormals.h"
 #include "app/realtime/dsp_load.h"
 #include "app/text.h"
-#include "core/kernels/kernel.h"
 
 namespace ressort::session {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-constexpr std::chrono::microseconds longest{3000};  // for all parts
-constexpr std::size_t least_blocks = 3;
-constexpr double most_steps = 1e6;  // a sample, of all voices; larger parts are not measured
-
-template <class T>
-double measured_ns(const Program& program, std::size_t voices, Isa isa, Clock::duration patience) {
-  std::vector<std::unique_ptr<Kernel<T>>> kernels;
-  do {
-    kernels.push_back(make_kernel<T>(program, voices, isa));
-  } while (kernels.size() * kernels[0]->width() < voices);
-  const std::size_t width = kernels[0]->width();
-  for (const auto& kernel : kernels) {
-    for (std::size_t lane = 0; lane < width; ++lane) {
-      for (std::uint32_t c = 0; c < program.coefficients.size(); ++c) {
-        kernel->coefficients.set(
-            lane, c, coefficient_value(program, program.coefficients[c], program.parameters, 1.0),
-            false);
-      }
-    }
-  }
-  Aligned<T> value(max_block_frames * width * program.inputs.size());
-  for (std::size_t i = 0; i < value.size(); ++i) {
-    const InputSlot& input = program.inputs[i / width % program.inputs.size()];
-    value[i] = input.is_force ? T(0) : static_cast<T>(program.position[input.node]);
-  }
-  const Aligned<T> velocity(value.size());
-  const Aligned<T> audio(max_block_frames * width * program.audio_coefficients.size());
-  Aligned<T> outputs(max_block_frames * width * program.outputs.size());
-  const DenormalsFlushed flushed;
-  auto fastest = Clock::duration::max();
-  const auto end = Clock::now() + patience;
-  for (std::size_t block = 0; block < least_blocks || Clock::now() < end; ++block) {
-    const auto start = Clock::now();
-    for (const auto& kernel : kernels) {
-      kernel->step({.frames = max_block_frames,
-                    .value = value.data(),
-                    .velocity = velocity.data(),
-                    .audio = audio.data(),
-                    .outputs = outputs.data()});
-    }
-    fastest = std::min(fastest, Clock::now() - start);
-  }
-  return std::chrono::duration<double, std::nano>(fastest).count() / max_block_frames;
+double cpu_ns() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return 1e9 * static_cast<double>(now.tv_sec) + static_cast<double>(now.tv_nsec);
 }
 
 }  // namespace
 
-void measure(Plan& plan, const Engine& engine, const CompileOptions& options, int voices) {
+double cpu_time_ns(const Program&, const std::function<void()>& play) {
+  const DenormalsFlushed flushed;
+  const double start = cpu_ns();
+  play();
+  return cpu_ns() - start;
+}
+
+void measure(Plan& plan, const Engine& engine, const CompileOptions& options, int voices,
+             const Timings& timings) {
   auto part = plan.parts.begin();
+  const Workload load{.is_double = options.precision == Precision::float64,
+                      .isa = options.isa,
+                      .voices = voices,
+                      .executor = options.executor};
   for (const Program& program : engine.machine().parts) {
-    if (program.moving == 0) {
-      continue;
-    }
-    const auto patience = longest / static_cast<long>(plan.parts.size());
-    const auto count = static_cast<std::size_t>(std::max(1, voices));
-    if (static_cast<double>(count) * worst_steps(program) > most_steps) {
+    if (program.moving > 0 && part != plan.parts.end()) {
+      part->measured_ns = known_ns(program, load, timings).value_or(0.0);
+      part->voices = voices;
       ++part;
-      continue;
     }
-    (part++)->measured_ns = options.precision == Precision::float32
-                                ? measured_ns<float>(program, count, options.isa, patience)
-                                : measured_ns<double>(program, count, options.isa, patience);
   }
 }
 
 std::string overload_warning(const Plan& plan, int voices, double rate_hz, Precision precision) {
-  double predicted_ns = 0.0;
+  double ns = 0.0;
   for (const Part& part : plan.parts) {
-    predicted_ns += part.predicted_ns;
+    ns += part.ns();
   }
-  const double share = predicted_ns * 1e-9 * rate_hz;
+  const double share = ns * 1e-9 * rate_hz;
   if (!(share > DspLoad::most)) {
     return {};
   }

@@ -1,6 +1,7 @@
-// app/session: measured and predicted cost of a plan.
+// app/session: the cost of a plan on this machine.
 #pragma once
 
+#include <functional>
 #include <string>
 
 #include "app/rooms.h"
@@ -8,12 +9,16 @@
 
 namespace ressort::session {
 
-// Measures the cost of each part at rest with all voices, and sets Part::measured_ns to the fastest
-// of a few blocks. Takes a few milliseconds in all. [any thread but audio]
-void measure(Plan& plan, const Engine& engine, const CompileOptions& options, int voices);
+// Measures CPU time of this thread, with denormals flushed: Timings::time on this machine.
+double cpu_time_ns(const Program& program, const std::function<void()>& play);
 
-// Returns a warning if one core is too slow for all voices with all contacts closed; empty if it is
-// fast enough. [any thread but audio]
+// Sets Part::measured_ns of the plan of a playing engine, by known_ns(): a few milliseconds for
+// each part that was not measured before. [any thread but audio]
+void measure(Plan& plan, const Engine& engine, const CompileOptions& options, int voices,
+             const Timings& timings);
+
+// Returns a warning if one core is too slow for all voices with all contacts closed, by the
+// measured cost if it is known; empty if it is fast enough. [any thread but audio]
 std::string overload_warning(const Plan& plan, int voices, double rate_hz, Precision precision);
 
 // Returns ways to lower the load: "-p 3, a lower rate, ...". `voices`: how many fit; 0: none.

@@ -82,7 +82,8 @@ Planned plan(const CompileRequest& request, const Analysis& analysis, const Proo
       .executor = options.executor};
   return make_plan(std::move(machine), load,
                    request.is_published() ? Method::direct : options.method, options.most_modes,
-                   request.budget, options.progress, make_promise(request, analysis, proof));
+                   request.budget, options.progress, make_promise(request, analysis, proof),
+                   {.timings = options.timings, .forms = options.forms});
 }
 
 struct BowCheck {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "core/compile/machine.h"
@@ -27,6 +28,8 @@ struct CompileOptions {
   std::optional<Budget> budget;  // replaces the preset's
   Isa isa = best_isa();          // no wider than the machine's
   std::uint32_t most_modes = patient_modes;  // masses of a part up to which modes are computed
+  const Timings* timings = nullptr;          // for the plan; null: the same forms on every machine
+  std::vector<std::string> forms;            // of an earlier plan, which is repeated; see Choice
   Executor* executor = nullptr;              // helper threads; outlives the engine; null: none
   bool find_gain = false;         // choose the gain so that a forte note peaks at -6 dBFS
   bool force = false;             // do not narrow ranges to stable values

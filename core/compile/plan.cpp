@@ -12,6 +12,8 @@ namespace ressort::compile {
 namespace {
 
 constexpr std::uint32_t most_steps_to_reach = 8;
+constexpr double most_behind = 4.0;  // times the best estimate: a form beyond that is not measured
+constexpr double least_gain = 1.0 / 0.9;  // for which the first in rank is given up
 
 std::string in_ns(double ns) {
   char text[32];
@@ -27,7 +29,7 @@ std::string rounded(double value) {
 
 std::string describe(const Accuracy& accuracy) {
   if (!accuracy.is_known) {
-    return "nobody knows how far off the continuous network";
+    return "its error against the continuous network is not known";
   }
   if (!std::isfinite(accuracy.cents)) {
     return "without a partial of the continuous network";
@@ -38,17 +40,19 @@ std::string describe(const Accuracy& accuracy) {
 
 class Chooser {
  public:
+  // `recorded`: the name of the form to take; empty: the choice is free.
   Chooser(Program& program, const Workload& load, std::uint32_t most_modes, const Budget& budget,
-          const Progress& progress)
+          const Progress& progress, const Timings* timings = nullptr, std::string recorded = {})
       : program_(program),
         load_(load),
         progress_(progress),
+        timings_(timings),
+        recorded_(std::move(recorded)),
         most_modes_(most_modes),
         eigenvectors_of_(most_tied_masses(program)),
-        budget_(budget),
-        is_asked_(budget.is_physical() || budget.silence_db > -Budget::unlimited) {}
+        budget_(budget) {}
 
-  // Keeps what is left of a budget of pitch and decay.
+  // Chooses a form that keeps what is left of a budget of pitch and decay.
   Part choose(Judge& judge, const Accuracy& spent) {
     spent_ = spent;
     judge_ = &judge;
@@ -70,34 +74,33 @@ class Chooser {
     } else {
       consider_identical();
     }
+    settle();
     Part part = take("");
     part.may_gain = may_gain_;
     return part;
   }
 
-  // Exact modes, which bear any stiffness, or so many steps a sample that they bear what keys ask
-  // for; nothing where neither is to be had.
+  // Chooses exact modes, which are stable at any stiffness, or enough steps a sample for the
+  // stiffest key; nothing if the part has neither.
   std::optional<Part> reach(Judge* judge, const Accuracy& spent) {
     spent_ = spent;
     judge_ = judge;
-    // Of a spring that bends the straight part is no mode, and bears no more than as published.
+    // Modes contain only the linear part of a nonlinear spring; the rest is as published, and so is
+    // its limit of stability.
     if (eigenvectors_of_ <= most_modes_ && !contains_bent_springs(program_)) {
       consider(Method::modal);
     }
     may_gain_ = eigenvectors_of_ > most_modes_ && eigenvectors_of_ <= patient_modes;
     const std::uint32_t times = steps_to_reach();
     if (program_.modes.empty() && times <= most_steps_to_reach && !may_gain_) {
-      Program fine = oversampled_program(program_, times);
-      const Workload load = load_at_steps();
-      Chooser chooser(fine, load, 0, {}, progress_);
-      chooser.choose();
-      progress_.spend(program_.ends.size() + program_.position.size());
-      add(Method::oversampled, oversampled_form(std::move(fine), times));
+      add_steps(times, load_at_steps());
     }
-    // How many voices of it a machine can play is found as it plays; one it must.
-    if (candidates_.empty() || candidates_[best_].ns > 0.5e9 / program_.rate_hz * load_.voices) {
+    // One voice must be affordable. How many are is found out while playing.
+    if (candidates_.empty() ||
+        nominal_ns * candidates_[best_].operations > 0.5e9 / program_.rate_hz * load_.voices) {
       return std::nullopt;
     }
+    settle();
     return take("for its highest keys");
   }
   bool may_gain() const { return may_gain_; }
@@ -115,8 +118,11 @@ class Chooser {
   struct Candidate {
     Method method;
     Form form;
-    double ns;
-    Accuracy accuracy;
+    std::string name;
+    double operations;
+    std::optional<Accuracy> of_form;  // alone
+    Accuracy accuracy;                // with what was spent before
+    std::optional<double> measured_ns = {};
   };
 
   std::uint32_t steps_to_reach() const {
@@ -135,7 +141,7 @@ class Chooser {
 
   void consider_identical() {
     for (const Method method : methods_for(KernelRow::Use::published)) {
-      if (row_of(method).least_ns == nullptr || may_pay(row_of(method))) {
+      if (row_of(method).least_operations == nullptr || may_pay(row_of(method))) {
         consider(method);
       }
     }
@@ -163,25 +169,44 @@ class Chooser {
   // whether it meets the budget.
   bool consider_steps(std::uint32_t times) {
     Program fine = oversampled_program(program_, times);
-    if (!judge_->of(oversampled_form(fine, times)).is_known) {
+    const Accuracy accuracy = judge_->of(oversampled_form(std::move(fine), times));
+    if (!accuracy.is_known) {
       return false;
     }
-    Chooser chooser(fine, load_, 0, {}, progress_);
-    chooser.choose();
-    progress_.spend(program_.ends.size() + program_.position.size());
-    add(Method::oversampled, oversampled_form(std::move(fine), times));
+    add_steps(times, load_, accuracy);
     return candidates_.back().accuracy.meets(budget_);
   }
 
-  // Of modes most sleep most of the time, where they may.
-  double worth_ns(Method method, double ns) const {
-    return method == Method::modal && budget_.silence_db > -Budget::unlimited ? 0.5 * ns : ns;
+  // Adds `times` steps a sample in every published form that may be the cheapest of them. All of
+  // them have the same accuracy.
+  void add_steps(std::uint32_t times, const Workload& load, std::optional<Accuracy> accuracy = {}) {
+    Program fine = oversampled_program(program_, times);
+    Chooser chooser(fine, load, 0, {}, progress_);
+    chooser.consider_identical();
+    progress_.spend(program_.ends.size() + program_.position.size());
+    const std::vector<std::size_t> all =
+        is_open() ? chooser.leading() : std::vector<std::size_t>{chooser.best_};
+    for (const std::size_t i : all) {
+      fine.form = chooser.candidates_[i].form;
+      add(Method::oversampled, oversampled_form(fine, times), accuracy);
+      accuracy = candidates_.back().of_form;
+    }
   }
 
-  // Whether a form that takes long to find is worth the search.
+  // Whether another form than the first in rank may be taken.
+  bool is_open() const { return timings_ != nullptr || !recorded_.empty(); }
+
+  // Modes below the budget of silence are not stepped, on average half of them.
+  double weight_of(Method method) const {
+    return method == Method::modal && budget_.silence_db > -Budget::unlimited ? 0.5 : 1.0;
+  }
+
+  // Whether a form that takes long to compute may be the cheapest.
   bool may_pay(const KernelRow& row) {
+    const double behind = is_open() ? most_behind : 1.0;
     const bool pays = eigenvectors_of_ <= patient_modes && program_.moving > 4 &&
-                      worth_ns(row.method, row.least_ns(program_, load_)) < candidates_[best_].ns;
+                      weight_of(row.method) * row.least_operations(program_, load_) <
+                          behind * candidates_[best_].operations;
     may_gain_ = pays && eigenvectors_of_ > most_modes_;
     return pays && !may_gain_;
   }
@@ -196,85 +221,168 @@ class Chooser {
     return true;
   }
 
-  // Of those that keep the budget the cheapest, else the nearest to it; what nobody knows comes
-  // last, and of that what is as published.
-  bool is_better(const Candidate& a, const Candidate& b) const {
-    const auto cost = [&](const Candidate& c) { return worth_ns(c.method, c.ns); };
-    if (judge_ == nullptr) {
-      return cost(a) < cost(b);
-    }
-    const auto excess = [&](const Candidate& c) {
-      return !c.accuracy.is_known ? Budget::unlimited
+  // How many times a budget is exceeded, 1 if it is kept; unlimited if the error is not known.
+  double excess(const Candidate& c) const {
+    return judge_ == nullptr      ? 1.0
+           : !c.accuracy.is_known ? Budget::unlimited
                                   : std::max({1.0, c.accuracy.cents / budget_.cents,
                                               c.accuracy.t60_percent / budget_.t60_percent});
-    };
+  }
+  double cost(const Candidate& c) const {
+    return weight_of(c.method) * (c.measured_ns ? *c.measured_ns : c.operations);
+  }
+
+  // Ranks by excess, then by cost. Of forms whose error is not known, the published scheme is
+  // first.
+  bool is_better(const Candidate& a, const Candidate& b) const {
     const bool is_published = a.method == Method::direct;
-    if (!a.accuracy.is_known && !b.accuracy.is_known &&
+    if (judge_ != nullptr && !a.accuracy.is_known && !b.accuracy.is_known &&
         is_published != (b.method == Method::direct)) {
       return !is_published;
     }
     return excess(a) != excess(b) ? excess(a) < excess(b) : cost(a) < cost(b);
   }
 
-  void add(Method method, Form form) {
-    const Accuracy accuracy = judge_ == nullptr ? Accuracy{} : sum_of(judge_->of(form), spent_);
+  void add(Method method, Form form, std::optional<Accuracy> of_form = {}) {
+    if (judge_ != nullptr && !of_form) {
+      of_form = judge_->of(form);
+    }
+    const Accuracy accuracy = of_form ? sum_of(*of_form, spent_) : Accuracy{};
     program_.form = std::move(form);
-    const double ns = predicted_ns(program_, load_);
-    candidates_.push_back({method, std::move(program_.form), ns, accuracy});
+    const double count = operations(program_, load_);
+    std::string name = form_name(program_.form);
+    candidates_.push_back(
+        {method, std::move(program_.form), std::move(name), count, of_form, accuracy});
     if (is_better(candidates_.back(), candidates_[best_])) {
       best_ = candidates_.size() - 1;
     }
   }
 
-  Part take(const std::string& why) {
+  // Returns the candidates that may be the cheapest: those that keep the budget as well as the best
+  // does, and whose estimates are near to its.
+  std::vector<std::size_t> leading() const {
+    std::vector<std::size_t> found;
     const Candidate& best = candidates_[best_];
-    program_.form = std::move(candidates_[best_].form);
+    for (std::size_t i = 0; i < candidates_.size(); ++i) {
+      const Candidate& one = candidates_[i];
+      if (i == best_ ||
+          (excess(one) == excess(best) && one.accuracy.is_known == best.accuracy.is_known &&
+           cost(one) < most_behind * cost(best))) {
+        found.push_back(i);
+      }
+    }
+    return found;
+  }
+
+  // Replaces the first in rank by the form that an earlier plan had, or by one that is measured to
+  // be clearly cheaper.
+  void settle() {
+    const auto recorded =
+        std::find_if(candidates_.begin(), candidates_.end(),
+                     [&](const Candidate& candidate) { return candidate.name == recorded_; });
+    if (recorded != candidates_.end()) {
+      best_ = static_cast<std::size_t>(recorded - candidates_.begin());
+      return;
+    }
+    if (timings_ == nullptr || !is_measurable(program_, load_)) {
+      return;
+    }
+    const std::vector<std::size_t> all = leading();
+    bool is_known = true;
+    for (const std::size_t i : all) {
+      progress_.spend(1);
+      program_.form = std::move(candidates_[i].form);
+      candidates_[i].measured_ns = known_ns(program_, load_, *timings_);
+      candidates_[i].form = std::move(program_.form);
+      is_known = is_known && candidates_[i].measured_ns;
+    }
+    is_untimed_ = all.size() > 1 && !is_known;
+    if (!is_known) {
+      for (const std::size_t i : all) {
+        candidates_[i].measured_ns = i == best_ ? candidates_[i].measured_ns : std::nullopt;
+      }
+      return;
+    }
+    const double first = cost(candidates_[best_]);
+    for (const std::size_t i : all) {
+      if (cost(candidates_[i]) * least_gain < first &&
+          cost(candidates_[i]) < cost(candidates_[best_])) {
+        best_ = i;
+      }
+    }
+  }
+
+  // Says how the others compare with the chosen form: in ns if they were measured with it, else in
+  // operations.
+  std::string comparison() const {
+    const Candidate& best = candidates_[best_];
+    std::string text;
+    for (const Candidate& one : candidates_) {
+      if (&one == &best) {
+        continue;
+      }
+      const bool is_measured = best.measured_ns && one.measured_ns;
+      text += (text.empty() ? "" : ", ") + one.name + " " +
+              (is_measured ? in_ns(*one.measured_ns)
+                           : rounded(one.operations / best.operations) + " times the operations");
+    }
+    return text;
+  }
+
+  Part take(const std::string& why) {
+    std::string others = why.empty() ? comparison() : why;
+    Candidate& best = candidates_[best_];
+    program_.form = std::move(best.form);
     accuracy_ = best.accuracy;
     Part part{.method = best.method,
               .masses = program_.moving,
               .links = program_.ends.size(),
-              .predicted_ns = best.ns,
+              .form = best.name,
+              .estimated_ns = nominal_ns * best.operations,
+              .measured_ns = best.measured_ns.value_or(0.0),
+              .voices = load_.voices,
+              .is_untimed = is_untimed_,
               .reason = description(program_)};
-    std::string others;
-    for (const Candidate& candidate : candidates_) {
-      if (candidate.method != best.method) {
-        others += (others.empty() ? "" : ", ") + std::string(method_name(candidate.method)) +
-                  " would take " + in_ns(candidate.ns);
-      }
-    }
-    part.reason += "; at most about " + in_ns(best.ns) + " a sample";
     part.reason += judge_ != nullptr ? ", " + describe(accuracy_) : "";
     part.reason += published_;
-    part.reason += !why.empty() ? ", " + why : others.empty() ? "" : ", " + others;
+    part.reason += !others.empty() ? ", " + others : "";
     return part;
   }
 
   Program& program_;
   const Workload& load_;
   const Progress& progress_;
+  const Timings* timings_;
+  std::string recorded_;
   std::uint32_t most_modes_;
-  std::uint32_t eigenvectors_of_;  // masses that hang together
-  Budget budget_;                  // without what the published scheme meets
-  bool is_asked_;
-  Judge* judge_ = nullptr;  // null: whatever is as published is near enough
+  std::uint32_t eigenvectors_of_;  // connected masses
+  Budget budget_;                  // without the limits that the published scheme keeps
+  Judge* judge_ = nullptr;         // null: the published scheme is accurate enough
   Accuracy spent_;
-  Accuracy accuracy_;      // of what was taken
-  std::string published_;  // how far off it would be, where that is too far
+  Accuracy accuracy_;      // of the chosen form
+  std::string published_;  // the error of the published scheme, if it is too large
   bool may_gain_ = false;
+  bool is_untimed_ = false;
   std::vector<Candidate> candidates_;
   std::size_t best_ = 0;
 };
 
-// All parts in forms that bear what keys ask for; nothing where one has none.
+// Returns the form that an earlier plan had for the next part; empty if there was none.
+std::string recorded_form(const Choice& choice, std::size_t part) {
+  return part < choice.forms.size() ? choice.forms[part] : std::string();
+}
+
+// Plans all parts in forms that are stable for the stiffest key; nothing if one part has none.
 std::optional<Planned> reach(const Machine& machine, const Workload& load, std::uint32_t most_modes,
                              const Budget& budget, const Progress& progress, const Promise& promise,
-                             bool& may_gain) {
+                             const Choice& choice, bool& may_gain) {
   Planned planned{machine, {}, Budget::unlimited};
   for (Program& program : planned.machine.parts) {
     if (program.moving == 0) {
       continue;
     }
-    Chooser chooser(program, load, most_modes, budget, progress);
+    Chooser chooser(program, load, most_modes, budget, progress, choice.timings,
+                    recorded_form(choice, planned.parts.size()));
     std::optional<Judge> judge;
     if (budget.is_physical()) {
       judge.emplace(program,
@@ -302,18 +410,20 @@ std::optional<Planned> reach(const Machine& machine, const Workload& load, std::
 
 Planned make_plan(Machine machine, const Workload& load, std::optional<Method> method,
                   std::uint32_t most_modes, const Budget& budget, const Progress& progress,
-                  const Promise& promise) {
+                  const Promise& promise, const Choice& choice) {
   std::vector<Part> parts;
   bool may_gain = false;
   if (load.reaches_beyond() && !method) {
-    if (auto planned = reach(machine, load, most_modes, budget, progress, promise, may_gain)) {
+    if (auto planned =
+            reach(machine, load, most_modes, budget, progress, promise, choice, may_gain)) {
       return *std::move(planned);
     }
   }
   Workload published = load;
   published.wanted_factor = load.highest_factor;
   for (Program& program : machine.parts) {
-    Chooser chooser(program, published, most_modes, budget, progress);
+    Chooser chooser(program, published, most_modes, budget, progress, choice.timings,
+                    recorded_form(choice, parts.size()));
     std::optional<Judge> judge;
     if (budget.is_physical() && program.moving > 0 && program.waveguides.empty()) {
       judge.emplace(program,
@@ -329,7 +439,8 @@ Planned make_plan(Machine machine, const Workload& load, std::optional<Method> m
     }
     if (auto shards = share_out(program, load, progress)) {
       program.form = *std::move(shards);
-      part.predicted_ns = predicted_ns(program, load);
+      part.estimated_ns = estimated_ns(program, load);
+      part.measured_ns = 0.0;
       part.reason += ", " + description(program);
     }
     part.may_gain |= may_gain;
@@ -338,6 +449,14 @@ Planned make_plan(Machine machine, const Workload& load, std::optional<Method> m
     }
   }
   return {std::move(machine), std::move(parts)};
+}
+
+std::vector<std::string> forms_of(const Plan& plan) {
+  std::vector<std::string> forms;
+  for (const Part& part : plan.parts) {
+    forms.push_back(part.form);
+  }
+  return forms;
 }
 
 std::optional<Accuracy> accuracy_of(const std::vector<Part>& parts) {
@@ -373,7 +492,7 @@ std::optional<std::string> broken_promise(const Plan& plan) {
              ? "the budget " + promised + " is not kept: a partial may be " +
                    (accuracy.is_bound ? "up to " : "") + found + " off"
              : "whether the budget " + promised + " is kept is not known: the poles of so many " +
-                   "masses would take too long to find";
+                   "masses would take too long to compute";
 }
 
 std::string describe(const std::vector<Part>& parts) {
@@ -381,7 +500,11 @@ std::string describe(const std::vector<Part>& parts) {
   for (const Part& part : parts) {
     text += std::string(method_name(part.method)) + ": " + count_of(part.masses, "mass", "masses") +
             ", " + count_of(part.links, "link", "links") + " (" + part.reason +
-            (part.measured_ns > 0.0 ? "; measured at rest: " + in_ns(part.measured_ns) : "") +
+            (part.measured_ns > 0.0
+                 ? "; measured " + in_ns(part.measured_ns) + " a sample for " +
+                       count_of(static_cast<std::size_t>(part.voices), "voice", "voices") +
+                       " on this machine"
+                 : "") +
             ")\n";
   }
   return text.empty() ? "nothing moves\n" : text;

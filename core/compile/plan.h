@@ -1,13 +1,15 @@
-// core/compile: how each part of a machine will be computed, and why, in words that a person can
-// read.
+// core/compile: chooses the kernel of each part of a machine, and says why in words that a person
+// can read.
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "core/compile/accuracy/accuracy.h"
+#include "core/kernels/measure.h"
 #include "core/kernels/program.h"
 #include "core/kernels/registry.h"
 #include "core/model/preset/budget.h"
@@ -15,68 +17,91 @@
 
 namespace ressort::compile {
 
-// For how many masses the eigenvectors may be sought; the time grows with the third power. A method
-// that is asked for by name is not held back by this.
-inline constexpr std::uint32_t quick_modes = 320;  // while a person waits: 20 ms
-inline constexpr std::uint32_t patient_modes =
-    1000;  // while the model sounds already: half a second
+// The most masses whose eigenvectors are computed; the time grows with the third power. A method
+// that a person asks for by name has no such limit.
+inline constexpr std::uint32_t quick_modes = 320;     // while a person waits: 20 ms
+inline constexpr std::uint32_t patient_modes = 1000;  // while the model already plays: 0.5 s
 
-// Masses that hang together, and the kernel that steps them.
+// Connected masses, and the kernel that steps them.
 struct Part {
   Method method = Method::direct;
   std::size_t masses = 0;  // that move
   std::size_t links = 0;
-  double predicted_ns = 0.0;  // a sample, of all voices, with everything touching all the time
-  double measured_ns = 0.0;   // the same at rest, by who has tried it; 0: nobody
-  bool may_gain = false;      // by its modes, had it more patience
-  std::optional<Accuracy> accuracy;  // where a budget asks for pitch or decay
+  std::string form;  // form_name() of the kernel's tables, before the part is divided into shards
+  // ns per sample of all voices, with everything touching all the time: a rough guide that is the
+  // same on every machine, and the time on this one; 0 if it is not known.
+  double estimated_ns = 0.0;
+  double measured_ns = 0.0;
+  int voices = 1;                    // that both are for
+  bool may_gain = false;             // its modes were not computed, and may be cheaper
+  bool is_untimed = false;           // it has several forms, and not all of them are measured yet
+  std::optional<Accuracy> accuracy;  // if a budget limits pitch or decay
   std::string reason;
+
+  // The time on this machine if it is known, else the rough guide.
+  double ns() const { return measured_ns > 0.0 ? measured_ns : estimated_ns; }
 };
 
 struct Plan {
   std::vector<Part> parts;
-  Budget budget;                     // that it was made for
-  std::optional<Accuracy> accuracy;  // the worst of the parts, and what was merged
-  std::vector<std::string> notes;    // on what is not computed as it is written, or not at all
+  Budget budget;
+  std::optional<Accuracy> accuracy;  // of the worst part, merging included
+  std::vector<std::string> notes;    // on everything that is not computed as the model is written
 };
 
-// A machine in the forms that its plan says.
+// A machine whose parts have the forms of a plan.
 struct Planned {
   Machine machine;
   std::vector<Part> parts;
-  // On every stiffness: what the parts bear beside the published scheme's share of
-  // load.highest_factor; infinite for exact modes.
+  // The factor on every stiffness up to which the parts are stable, as a multiple of that of the
+  // published scheme (load.highest_factor); infinite for exact modes.
   double more = 1.0;
 };
 
-// Where a budget of pitch and decay has to hold, beside the start, and what is spent of it already.
+// The parameter box and the keys for which a budget of pitch and decay has to hold, and what
+// merging has already used of it.
 struct Promise {
-  std::vector<double> lowest;  // [parameter]; empty: none is turned
+  std::vector<double> lowest;  // [parameter]; empty: no parameter moves
   std::vector<double> highest;
   double highest_factor = 1.0;  // of the highest key
   Accuracy merged;
 };
 
-// Gives every part of the machine the form that the cost model says is the cheapest at its worst,
-// or the one of `method` where a part has it; divided among load.executor where that pays. With a
-// budget for pitch or decay, the cheapest whose poles keep it at all corners (accuracy.h), of the
-// published scheme, exact modes and several steps a sample; where none does or
-// nobody knows, the nearest. Where keys ask for more stiffness than the published scheme bears
-// (load.wanted_factor) all parts get exact modes or several steps a sample, if each can and half a
-// core is enough; else none does. O(elements), the eigenvectors of a part of up to `most_modes`
-// masses for which the modal form may pay, and what a Judge takes. [any thread but audio]
+// What the choice among the forms of a part goes by, besides their estimates.
+struct Choice {
+  const Timings* timings = nullptr;  // null: the estimates alone, the same on every machine
+  // [moving part] Part::form of an earlier plan, which is repeated; empty: nothing is repeated. A
+  // name that the part has no form for is ignored.
+  std::span<const std::string> forms = {};
+};
+
+// Chooses the form of every part of the machine: that of `method` if the part has it, else the
+// cheapest in the worst case. Large parts are then divided among load.executor if that pays.
+// Estimates rank the forms. With choice.timings, those that may be up to four times the best are
+// measured, and one that takes 10 % less than the first in rank replaces it. With a budget of pitch
+// or decay, only forms whose poles keep the budget at all corners (accuracy.h) are compared: the
+// published scheme, exact modes and several steps a sample. If none keeps it, or the error is
+// unknown, the plan takes the nearest. If keys need more stiffness than the published scheme allows
+// (load.wanted_factor), all parts get exact modes or several steps a sample, if each part has such
+// a form and half a core is enough for it by its estimate; else none does. O(elements), and the
+// eigenvectors of a part of up to `most_modes` masses if modes may be cheaper, and the time of a
+// Judge. [any thread but audio]
 Planned make_plan(Machine machine, const Workload& load, std::optional<Method> method = {},
                   std::uint32_t most_modes = patient_modes, const Budget& budget = {},
-                  const Progress& progress = {}, const Promise& promise = {});
+                  const Progress& progress = {}, const Promise& promise = {},
+                  const Choice& choice = {});
 
-// The worst of some parts, with what was merged; nothing without a budget of pitch or decay.
+// Returns Part::form of every part, for Choice::forms.
+std::vector<std::string> forms_of(const Plan& plan);
+
+// Returns the accuracy of the worst part; nothing without a budget of pitch or decay.
 std::optional<Accuracy> accuracy_of(const std::vector<Part>& parts);
 
-// What a plan does not keep of its budget of pitch and decay, in a sentence; nothing where it keeps
-// it all.
+// Returns a sentence on what a plan does not keep of its budget of pitch and decay; nothing if it
+// keeps all of it.
 std::optional<std::string> broken_promise(const Plan& plan);
 
-// One line a part, and one a note.
+// Return one line for each part, and one for each note.
 std::string describe(const std::vector<Part>& parts);
 std::string describe(const Plan& plan);
 

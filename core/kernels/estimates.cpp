@@ -28,15 +28,15 @@ LinkCount links_of(const Program& program) {
   return count;
 }
 
-double passive_ns(const Program& program) {
-  constexpr double of_a_shared_link = 120.0;  // measured: some three rounds of Newton's
-  constexpr double of_a_spring_in_web = 4.0;
+double passive_operations(const Program& program) {
+  constexpr double of_a_shared_link = 480.0;  // about three iterations of Newton's method
+  constexpr double of_a_spring_in_web = 16.0;
   if (const std::size_t springs = springs_of_web(program); springs > 0) {
     double sum = of_a_spring_in_web * static_cast<double>(springs);
     for (const LinkRun& run : program.link_runs) {
       const LawFacts& law = facts_of(run.law);
       const bool is_solved = run.scheme != Scheme::plain && !(law.contains_spring && law.is_curved);
-      sum += is_solved ? run.count * (law.solve_ns + of_a_shared_link) : 0.0;
+      sum += is_solved ? run.count * (law.solve_operations + of_a_shared_link) : 0.0;
     }
     return sum;
   }
@@ -60,7 +60,7 @@ double passive_ns(const Program& program) {
   double sum = 0.0;
   each([&](const LinkRun& run, Ends ends) {
     const bool is_shared = std::max(holders[ends.a], holders[ends.b]) > 1;
-    sum += facts_of(run.law).solve_ns + (is_shared ? of_a_shared_link : 0.0);
+    sum += facts_of(run.law).solve_operations + (is_shared ? of_a_shared_link : 0.0);
   });
   return sum;
 }
@@ -72,7 +72,7 @@ double packs_of(const Workload& load) {
 
 namespace {
 
-// Of a sweep that does not fit most of it has gone before it comes round again.
+// A sweep that does not fit has evicted most of its data before it starts again.
 double lines_beyond(double cache, double bytes) {
   return std::clamp(2.0 * (bytes - cache), 0.0, bytes) / 64.0;
 }

@@ -1,5 +1,6 @@
-// core/kernels: what a kernel will cost in time and memory, as the parts that all predictions are
-// made of.
+// core/kernels: rough estimates of a kernel's time and memory. They rank the forms of a part before
+// any is measured (measure.h), and decide what needs an order of magnitude only: whether a voice is
+// affordable, whether shards or helpers pay.
 #pragma once
 
 #include <cstddef>
@@ -7,14 +8,17 @@
 #include <string>
 
 #include "core/kernels/isa.h"
-#include "core/kernels/prices/prices.h"
 #include "core/kernels/program.h"
 
 namespace ressort::kernels {
 
 class Executor;
 
-// What a prediction is for.
+// ns per operation: a nominal figure for all machines, of which real ones may be two or three times
+// off in either direction. An operation is one instruction, on a whole vector or on one number.
+inline constexpr double nominal_ns = 0.25;
+
+// The conditions that an estimate or a measurement is for.
 struct Workload {
   bool is_double = true;
   Isa isa = Isa::base;
@@ -27,8 +31,7 @@ struct Workload {
   bool reaches_beyond() const { return wanted_factor > highest_factor; }
 };
 
-// Links by what they cost: those that only pull, in a line or bent, and those that have to look
-// first. Without those that are not plain.
+// Plain links by their cost: linear springs, nonlinear springs, and laws that need a comparison.
 struct LinkCount {
   double springs = 0.0;
   double bent = 0.0;
@@ -36,29 +39,27 @@ struct LinkCount {
 };
 LinkCount links_of(const Program& program);
 
-// What the links take that are not plain, once for all lanes, or for one number: while they touch.
+// Returns the operations of all links that are not plain while they touch, for one pack.
 // O(links + nodes)
-double passive_ns(const Program& program);
+double passive_operations(const Program& program);
 
-// How many packs the voices fill.
+// Returns the number of packs that the voices fill.
 double packs_of(const Workload& load);
 inline double bytes_of_number(const Workload& load) {
   return load.is_double ? 8.0 : 4.0;
 }
-inline double cost(const Work& work, const Workload& load) {
-  return work.cost(load.isa, load.is_double);
-}
 
-// Lines that a sweep over so many bytes brings from the second cache, and from beyond it.
+// Return the cache lines per sweep over so many bytes that miss a first-level cache of 48 kB, and a
+// second-level cache of 2 MB.
 double lines_of(double bytes);
 double far_lines_of(double bytes);
 
-// A sample of one voice at the very worst, in visits of some nanoseconds, links that are not plain
-// going through each other as long as they may: to know what not to try. O(runs)
+// Returns an upper bound on the steps of one voice per sample, with every iterative solve taking as
+// long as it may. It decides what is too large to try. O(runs)
 double worst_steps(const Program& program);
 
-// Bytes of one voice: its nodes and coefficients alone, with one number a link that all voices
-// share tables for, and with a table of its own for links that are stepped one by one.
+// Return the bytes of one voice: its nodes and coefficients alone, with one number per link if all
+// voices share the link tables, and with a table of its own for links that are stepped one by one.
 std::uint64_t node_bytes(const Program& program, std::uint64_t number_bytes);
 std::uint64_t bytes_with_shared_links(const Program& program, std::uint64_t number_bytes);
 std::uint64_t bytes_with_own_links(const Program& program, std::size_t links,

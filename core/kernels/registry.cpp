@@ -31,27 +31,10 @@ std::unique_ptr<Kernel<T>> make(const Program& program, std::size_t voices, Isa 
   return std::make_unique<K<T>>(program, program.form.get<Tables>(), voices, isa);
 }
 
-template <class Tables>
-constexpr bool has_work = requires(const Program& program, const Tables& form,
-                                   const Workload& load) {
-  work(program, form, load);
-};
-
-template <class Tables>
-constexpr auto work_of() -> Work (*)(const Program&, const Workload&) {
-  if constexpr (has_work<Tables>) {
-    return [](const Program& program, const Workload& load) {
-      return work(program, program.form.get<Tables>(), load);
-    };
-  } else {
-    return nullptr;
-  }
-}
-
 // Returns the row of kernel K. `Fits` makes its tables.
 template <class Tables, template <class> class K, class Fits>
 constexpr KernelRow row(Method method, std::string_view name, Use use, Fits,
-                        double (*least_ns)(const Program&, const Workload&) = nullptr) {
+                        double (*least_operations)(const Program&, const Workload&) = nullptr) {
   return {
       .kind = Form::kind_of<Tables>(),
       .method = method,
@@ -64,15 +47,10 @@ constexpr KernelRow row(Method method, std::string_view name, Use use, Fits,
         std::optional<Tables> tables = Fits()(request);
         return tables ? std::optional<Form>(std::move(*tables)) : std::nullopt;
       },
-      .least_ns = least_ns,
-      .work = work_of<Tables>(),
-      .predicted_ns =
+      .least_operations = least_operations,
+      .operations =
           [](const Program& program, const Workload& load) {
-            if constexpr (has_work<Tables>) {
-              return cost(work(program, program.form.get<Tables>(), load), load);
-            } else {
-              return predicted_ns(program, program.form.get<Tables>(), load);
-            }
+            return operations(program, program.form.get<Tables>(), load);
           },
       .description =
           [](const Program& program) { return description(program, program.form.get<Tables>()); },
@@ -97,7 +75,7 @@ constexpr KernelRow rows[] = {
           return modal_form(r.program, r.budget, r.progress, r.load.is_untuned,
                             r.load.reaches_beyond());
         },
-        least_modal_ns),
+        least_modal_operations),
     row<Oversampled, OversampledKernel>(
         Method::oversampled, "oversampled", Use::physical,
         [](const Request& r) {
@@ -162,8 +140,12 @@ std::vector<Method> methods_for(KernelRow::Use use) {
   return methods;
 }
 
-double predicted_ns(const Program& program, const Workload& load) {
-  return row_of(program.form).predicted_ns(program, load);
+double operations(const Program& program, const Workload& load) {
+  return row_of(program.form).operations(program, load);
+}
+
+double estimated_ns(const Program& program, const Workload& load) {
+  return nominal_ns * operations(program, load);
 }
 
 std::string description(const Program& program) {

@@ -1,5 +1,4 @@
-// core/kernels: the table of all kernels, with a row for each. The planner, the cost model,
-// explain,
+// core/kernels: the table of all kernels, with a row for each. The planner, the estimates, explain,
 // --method and the benchmark read the rows.
 //
 // A kernel is a folder: its tables, the function that makes them from a Program, and their cost
@@ -46,11 +45,10 @@ struct KernelRow {
   Use use;
   // Makes the tables of a Program; empty if the kernel cannot play it. [any thread but audio]
   std::optional<Form> (*fits)(const KernelRequest&);
-  // Returns a lower bound of the cost, if fits() takes long; else null.
-  double (*least_ns)(const Program&, const Workload&);
-  // The following need a Program in the row's form. `work` is null if the kernel contains others.
-  Work (*work)(const Program&, const Workload&);
-  double (*predicted_ns)(const Program&, const Workload&);
+  // Returns a lower bound of the operations, if fits() takes long; else null.
+  double (*least_operations)(const Program&, const Workload&);
+  // The following need a Program in the row's form.
+  double (*operations)(const Program&, const Workload&);
   std::string (*description)(const Program&);
   std::uint64_t (*voice_bytes)(const Program&, std::uint64_t number_bytes);
   std::unique_ptr<Kernel<float>> (*make_float)(const Program&, std::size_t voices, Isa);
@@ -71,10 +69,12 @@ std::string removed_method_advice(std::string_view name);
 // Returns the methods of one use, the reference first.
 std::vector<Method> methods_for(KernelRow::Use use);
 
-// Nanoseconds a sample for all voices in the form that the Program has, everything that can touch
-// touching all the time: what a block's budget has to hold. By the prices of the machine's kind
-// (prices.h): the same on all machines of one instruction set.
-double predicted_ns(const Program& program, const Workload& load);
+// Returns the operations per sample of all voices in the Program's form, with everything that can
+// touch touching all the time: the worst case that a block's deadline has to allow for.
+double operations(const Program& program, const Workload& load);
+
+// The same in ns, at nominal_ns each: a rough guide.
+double estimated_ns(const Program& program, const Workload& load);
 
 // Describes the form of this Program in words.
 std::string description(const Program& program);

@@ -31,7 +31,7 @@ struct Bow {
       .is_friction = true,
       .is_curved = false,
       .is_convex = false,
-      .solve_ns = 15.0,
+      .solve_operations = 60.0,
       .faust = R"(
 bow(z, s, d, v) =
   select2(abs(v) < s, 0.0, select2(abs(v) < s/3.0, slip, stick)*z)
@@ -94,9 +94,9 @@ with {
     return {force(V{}, v), select(fast < outer, select(fast < inner, stick, -slip), V{})};
   }
 
-  // Returns the friction f(v) at the speed v that solves v + half f(v) = wanted, in closed form. For
-  // half Z > 3 there may be three such speeds. The bow then keeps sticking, or slipping, as it did
-  // at the speed `last`.
+  // Returns the friction f(v) at the speed v that solves v + half f(v) = wanted, in closed form.
+  // For half Z > 3 there may be three such speeds. The bow then keeps sticking, or slipping, as it
+  // did at the speed `last`.
   V grip(V wanted, V last, V half) const {
     const V side = select(wanted < V{}, V{} - 1, V{} + 1);
     const V fast = side * wanted;

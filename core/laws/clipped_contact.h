@@ -39,7 +39,7 @@ struct ClippedContact {
                   .velocity_says = "has 'nlContact'"}}},
       .zone = Zone::below,
       .is_odd = false,
-      .solve_ns = 80.0,  // by Newton's method
+      .solve_operations = 320.0,  // by Newton's method
       .faust = R"(
 clipped_contact(s, c, k, z, t, d, v) = select2(d > 0.0 - t, 0.0, elastic + z*v)
 with {

@@ -1,6 +1,6 @@
 // core/laws: a cubic spring whose secant stiffness grows from s to at most k, which it reaches at
-// |d| = b = sqrt((k - s)/c). Beyond b the damping is larger. mi.lib has b = sqrt(k - s)/c, where the
-// force jumps; here it is continuous.
+// |d| = b = sqrt((k - s)/c). Beyond b the damping is larger. mi.lib has b = sqrt(k - s)/c, where
+// the force jumps; here it is continuous.
 //   c = 0:      f = s d + Z v
 //   s >= k:     f = k d + Z v
 //   |d| <= b:   f = s d + c d^3 + Z v
@@ -42,9 +42,9 @@ struct ClippedPotential {
   V less;
 };
 
-// Returns the largest slope of s d + c d^3 before the clip at k. At b, where c b^2 = k - s, the slope
-// is s + 3 c b^2 = 3 k - 2 s. The bound holds for ranges of all arguments, so it must not fall with k
-// or c: if c may differ from 0, it is the larger of s and 3 k - 2 s.
+// Returns the largest slope of s d + c d^3 before the clip at k. At b, where c b^2 = k - s, the
+// slope is s + 3 c b^2 = 3 k - 2 s. The bound holds for ranges of all arguments, so it must not
+// fall with k or c: if c may differ from 0, it is the larger of s and 3 k - 2 s.
 inline double clipped_stiffness(double least_s, double most_s, bool is_bent, double most_k) {
   return is_bent ? std::max(most_s, 3.0 * most_k - 2.0 * least_s) : most_s;
 }
@@ -67,7 +67,7 @@ struct ClippedSpring {
                   .printed = 4,
                   .velocity_count = -1,
                   .velocity_says = "has 'nlSpringDamper'"}}},
-      .solve_ns = 80.0,  // by Newton's method
+      .solve_operations = 320.0,  // by Newton's method
       .faust = R"(
 clipped_spring(s, c, k, z, d, v) =
   select2(c == 0.0, select2(s >= k, bent, spring(k, z, d, v)), spring(s, z, d, v))

@@ -38,7 +38,7 @@ struct Contact {
       .is_odd = false,
       .is_curved = false,
       .is_straight = true,
-      .solve_ns = 35.0,
+      .solve_operations = 140.0,
       .faust = R"(
 contact(k, z, t, d, v) = select2(d > 0.0 - t, 0.0, spring(k, z, d + t, v));
 steady_contact(k, z, t, now, speed, way) = 0.0,

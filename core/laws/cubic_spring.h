@@ -23,7 +23,7 @@ struct CubicSpring {
                   .arguments = "@A @B K Q Z",
                   .printed = 3}}},
       .contains_spring = true,
-      .solve_ns = 30.0,
+      .solve_operations = 120.0,
       .faust = R"(
 cubic_spring(k, q, z, d, v) = spring(k, z, d, v) + q*d*d*d;
 steady_cubic_spring(k, q, z, now, speed, way) = 0.0, 0.5*z;

@@ -24,7 +24,7 @@ struct EitherBow {
                   .printed = 3}}},
       .is_friction = true,
       .is_convex = false,
-      .solve_ns = 90.0,  // both profiles
+      .solve_operations = 360.0,  // both profiles
       .faust = R"(
 either_bow(z, s, p, d, v) = select2(p > 0.0, bow(z, s, d, v), smooth_bow(z, s, d, v));
 steady_either_bow(z, s, p, now, speed, way) = 0.0, 0.0;

@@ -106,7 +106,7 @@ struct LawFacts {
   bool is_straight =
       false;              // a spring and a damper wherever it acts; the law has a function `inside`
   bool is_convex = true;  // the force never falls with d or v
-  double solve_ns = 0.0;  // measured time to solve one discrete gradient
+  double solve_operations = 0.0;  // of one discrete gradient, roughly; ranks the kernels
   // FAUST definitions, one after the other. The arguments come first, as coefficients at the sample
   // rate of the program. The quantities are those of discrete_gradient.h.
   //   NAME(arguments, d, v) = the published force
@@ -118,9 +118,9 @@ struct LawFacts {
   //   alone_NAME(arguments, force, damping, before, speed, way, gamma) = force
   //     optional: the solution in closed form. Without it, Newton's method finds the solution,
   //     which needs a gradient that does not fall.
-  // The passive form is for links that hold waveguides. There it covers the linear part of a law that
-  // contains a spring, too. The definitions may call `discrete`, `between`, `inside` and `risen`
-  // (core/model/faust/faust_words.cpp) and the definitions of other laws.
+  // The passive form is for links that hold waveguides. There it covers the linear part of a law
+  // that contains a spring, too. The definitions may call `discrete`, `between`, `inside` and
+  // `risen` (core/model/faust/faust_words.cpp) and the definitions of other laws.
   std::string_view faust;
 
   // Returns the index of the first argument with this role, or `count`.

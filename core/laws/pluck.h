@@ -33,7 +33,7 @@ struct Pluck {
       .zone = Zone::near,
       .is_curved = false,
       .is_convex = false,
-      .solve_ns = 100.0,
+      .solve_operations = 400.0,
       .faust = R"(
 pluck(k, s, z, d, v) =
   select2(abs(d) < s, 0.0, select2(abs(d) < s/10.0, outer, inner)*k + z*v)

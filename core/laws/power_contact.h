@@ -43,7 +43,7 @@ struct PowerContact {
                   .printed = 4}}},
       .zone = Zone::below,
       .is_odd = false,
-      .solve_ns = 250.0,  // by Newton's method, with powers lane by lane
+      .solve_operations = 1000.0,  // by Newton's method, with powers lane by lane
       .faust = R"(
 power_contact(k, p, z, t, d, v) =
   (k + z*v)*select2(d > 0.0 - t, 0.0, pow(max(d + t, 1e-300), max(p, 1.0)));

@@ -21,7 +21,7 @@ struct QuadraticSpring {
           {{{.word = "nlSpring2", .least = 3, .most = 3, .arguments = "@A @B K Q Z", .printed = 3},
             {.word = "nlSpring", .least = 3, .most = 3, .arguments = "@A @B K Q Z"}}},
       .contains_spring = true,
-      .solve_ns = 80.0,  // by Newton's method
+      .solve_operations = 320.0,  // by Newton's method
       .faust = R"(
 quadratic_spring(k, q, z, d, v) = spring(k, z, d, v) + q*d*abs(d);
 steady_quadratic_spring(k, q, z, now, speed, way) = 0.0, 0.5*z;
@@ -47,8 +47,8 @@ with {
   V curved(V d) const { return q / Scalar<V>(3.0) * absolute(d * d * d); }
 
   // f = K now + Z (now - before) + the discrete gradient of Q/3 |d|^3, which is
-  // sgn(after) Q/3 (a^2 + a b + b^2) with a = |after| and b = |before|, times (a - b)/(a + b) if the
-  // signs differ. This form is free of cancellation.
+  // sgn(after) Q/3 (a^2 + a b + b^2) with a = |after| and b = |before|, times (a - b)/(a + b) if
+  // the signs differ. This form is free of cancellation.
   V passive(const LinkState<V>& link) const {
     const V linear = steady(link).force;
     const V before = link.before();

@@ -27,7 +27,7 @@ struct SmoothBow {
                   .tail = " 1"}}},
       .is_friction = true,
       .is_convex = false,
-      .solve_ns = 75.0,
+      .solve_operations = 300.0,
       .faust = R"(
 smooth_bow(z, s, d, v) = 0.63*z*v*exp(0.5 - 4.0*ratio*ratio) with { ratio = v/s; };
 steady_smooth_bow(z, s, now, speed, way) = 0.0, 0.0;

@@ -31,7 +31,7 @@ struct Spring {
             {.word = "springDamperDamper", .least = 1, .most = 2, .arguments = "@A @B K [Z]"}}},
       .contains_spring = true,
       .is_curved = false,
-      .solve_ns = 16.0,
+      .solve_operations = 64.0,
       .faust = R"(
 spring(k, z, d, v) = k*d + z*v;
 steady_spring(k, z, now, speed, way) = 0.0, 0.5*z;

@@ -17,33 +17,33 @@ double sine(double reach, double cycles, std::size_t frame) {
 
 // --- hands --------------------------------------------------------------------------------------
 
-constexpr double away = 0.5;  // where no finger touches anything
+constexpr double away = 0.5;  // a distance at which no finger touches anything
 
-// Every input swings slowly, the first by `reach`.
+// All inputs oscillate slowly with the amplitude `reach`.
 Hand swing(double reach, double cycles = 1.0) {
   return [=](std::size_t, std::size_t frame) { return sine(reach, cycles, frame); };
 }
 
-// One sample of force.
+// A force impulse of one sample.
 Hand blow(double force) {
   return [=](std::size_t, std::size_t frame) { return frame == 0 ? force : 0.0; };
 }
 
-// The pick touches for half a block, so that there is something to be heard; then nothing does.
+// The pick touches the string for half a block to excite it, and then nothing touches it.
 Hand flick(double reach) {
   return [=](std::size_t input, std::size_t frame) {
     return input == 0 && frame < block_frames / 2 ? reach : away;
   };
 }
 
-// The pick never leaves its law's scale, and all fingers lie on.
+// The pick stays within the reach of its law, and all fingers touch the string.
 Hand lean(double reach) {
   return [=](std::size_t input, std::size_t frame) {
     return input == 0 ? sine(reach, 1.0, frame) : -away + sine(0.1, 1.0, frame);
   };
 }
 
-// Down and up at one speed per sample.
+// Moves down and up at a constant speed per sample.
 Hand draw(double speed) {
   return [=](std::size_t, std::size_t frame) {
     const std::size_t half = cycle_frames / 2;
@@ -66,7 +66,7 @@ std::string cubic_mesh() {
                   " mesh_K mesh_Z\n", " mesh_K 0.5 mesh_Z\n");
 }
 
-// Beyond this a text is longer than a model may be, and a macro stands for it.
+// A longer text would exceed the limit for models, so a macro is used instead.
 constexpr int most_written_masses = 100'000;
 
 std::string chain(int masses) {
@@ -93,7 +93,7 @@ std::string mesh(int side) {
          "\n" + scenes::output(1, node(7, 6));
 }
 
-// Anything linked to anything, by three links each of the same law.
+// Returns a random graph: three links of the same law from each mass to others.
 std::string random_graph(int masses, const std::string& law) {
   std::string text = "@g ground 0.\n";
   std::string links = "@hold springDamper @m_m0 @g 0.05 0.001\n";
@@ -114,7 +114,7 @@ std::string random_graph(int masses, const std::string& law) {
   return text + links + "@in1 frcInput @m_m1\n" + scenes::output(1, "m_m2");
 }
 
-// A C2, struck or plucked.
+// Returns a waveguide tuned to C2, with its exciter.
 std::string waveguide(const std::string& finger) {
   return "@hz param 65.40639\n@s waveguide 0.5 hz 4. 0.8 0.\n" + finger +
          "@out1 posOutput [@s 0.8]\n";
@@ -192,7 +192,8 @@ void add_families(std::vector<BenchScene>& all) {
   }
 }
 
-// Others are blown once, or touched now and then, which is cheap where the masses are few.
+// Returns whether everything that can touch touches all the time. Other scenes are struck once or
+// touched now and then, which is cheap for a few masses.
 bool is_worst(const std::string& name) {
   const auto starts = [&](const char* text) { return name.starts_with(text); };
   return name.ends_with("-contact") || (starts("IPlay") && name.ends_with("voices")) ||

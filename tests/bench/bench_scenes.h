@@ -1,4 +1,4 @@
-// bench: what is measured. A scene is a model's text, what its hands do, and how many play it.
+// bench: the scenes. A scene is a model's text, the motion of its inputs, and the number of voices.
 #pragma once
 
 #include <cstddef>
@@ -9,10 +9,10 @@
 namespace ressort::bench {
 
 inline constexpr std::size_t block_frames = 64;
-inline constexpr std::size_t cycle_blocks = 192;  // after which every hand begins again
+inline constexpr std::size_t cycle_blocks = 192;  // period of the inputs
 inline constexpr std::size_t cycle_frames = cycle_blocks * block_frames;
 
-// A parameter that moves with every sample.
+// A parameter that changes at every sample.
 struct Turn {
   std::string parameter;
   double middle = 0.0;
@@ -27,19 +27,16 @@ struct BenchScene {
   std::vector<Turn> turns;
   std::size_t voices = 1;     // each at its own pitch
   std::string tuned_by = "";  // the parameter that sets a voice's pitch in FAUST
-  std::string family = "";    // its curve in the picture; none where it is empty
-  std::size_t elements = 0;   // masses and links, about: what it costs FAUST and the reference
-  bool is_worst = false;      // all that can touch or sound does, all the time, as the plan reckons
+  std::string family = "";    // its curve in the picture; empty: none
+  std::size_t elements = 0;   // approximate number of masses and links
+  bool is_worst = false;      // everything touches all the time: the plan's case
 };
 
-// In the order in which they are printed.
+// Returns all scenes in the order in which they are printed.
 std::vector<BenchScene> all_scenes();
-// Each form over sizes, at its worst: what prices are fitted to, beside those of all_scenes() that
-// are at theirs.
-std::vector<BenchScene> fit_scenes();
 
-// The model with the parameters that move taken from channels of their own, after its `inputs`
-// others: FAUST's sliders move once a block.
+// Returns the model with its moving parameters read from audio channels after the `inputs` others,
+// because FAUST's sliders change only once a block.
 std::string text_with_channels(const BenchScene& scene, std::size_t inputs);
 
 }  // namespace ressort::bench

@@ -20,10 +20,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int most_cpu_s = 120;             // of one compiler for one program
-constexpr int most_kilobytes = 12'000'000;  // of its memory
+constexpr int most_cpu_s = 120;             // limit for one compiler run
+constexpr int most_kilobytes = 12'000'000;  // memory limit
 
-// What is around the class that FAUST writes; FAUSTFLOAT is defined by the compiler's options.
+// The code around the class that FAUST generates. The compiler's options define FAUSTFLOAT.
 const char* const before_class = R"(
 #include <algorithm>
 #include <cmath>
@@ -77,7 +77,7 @@ constexpr std::array<const char*, 2> compilers{"g++", "clang++"};
 
 enum class Outcome { done, failed, interrupted };
 
-// Ctrl-C reaches the command and this process: popen, unlike system, does not keep it away.
+// Ctrl-C reaches both the command and this process, since popen, unlike system, does not block it.
 Outcome outcome_of(const std::string& command) {
   FILE* const pipe = popen(("ulimit -t " + std::to_string(most_cpu_s) + "; ulimit -v " +
                             std::to_string(most_kilobytes) + "; (" + command + ") >/dev/null 2>&1")
@@ -92,14 +92,14 @@ Outcome outcome_of(const std::string& command) {
   return is_interrupted ? Outcome::interrupted : Outcome::failed;
 }
 
-// A program, as its file without an ending.
+// A program, by its file name without an extension.
 struct Source {
-  const char* prefix;  // of what people are shown
+  const char* prefix;  // in printed names
   bool is_export;
   fs::path base;
 };
 
-// One option in one precision, for all compilers.
+// One FAUST option in one precision, for all compilers.
 class Job {
  public:
   Job(const Source& source, const Option& option, bool is_double)
@@ -109,7 +109,7 @@ class Job {
         option_(option),
         is_double_(is_double) {}
 
-  // False if it was interrupted.
+  // Returns false if it was interrupted.
   bool build(const std::vector<std::string>& available) const {
     for (const std::string& compiler : available) {
       const std::string library = library_of(compiler);
@@ -200,7 +200,7 @@ std::string exported(const Network& peer) {
   return text ? *text : std::string();
 }
 
-// The same text is the same program, however its scene is called.
+// Returns a name that depends on the text only, so that scenes can share a program.
 fs::path base_of(const fs::path& folder, const std::string& text) {
   char name[40];
   std::snprintf(name, sizeof name, "%016zx", std::hash<std::string>{}(text + after_class));

@@ -1,4 +1,4 @@
-// bench: exported models, compiled by FAUST and a C++ compiler in several ways, and loaded.
+// bench: exported models, compiled by FAUST and C++ compilers with several options, and loaded.
 #pragma once
 
 #include <filesystem>
@@ -11,8 +11,7 @@
 
 namespace ressort::bench {
 
-// A compiled program of FAUST's, loaded into this process until it ends. Samples are double or
-// float, as is_double says.
+// A compiled FAUST program, loaded until this process ends. `is_double` is its precision.
 struct FaustLibrary {
   std::string variant;  // for people: "-vec clang++"
   bool is_double = true;
@@ -25,11 +24,10 @@ struct FaustLibrary {
   void (*compute)(void* instance, int frames, void* inputs, void* outputs) = nullptr;
 };
 
-// Every variant that compiles, of ressort's export and of the same network in the words of mi.lib:
-// options none, -vec and -mcd 0, in both precisions, by every compiler that is there; several at
-// once, each step for at most two minutes of CPU time. What was made once
-// lies in `folder` and is taken from there, and so is the knowledge that something does not
-// compile.
+// Compiles ressort's export and the same network written with mi.lib, with no option, -vec and
+// -mcd 0, in both precisions, with every C++ compiler found, and returns the variants that compile.
+// Several compilers run in parallel, each for at most two minutes of CPU time. `folder` caches the
+// results, failures included.
 std::vector<FaustLibrary> faust_libraries(const BenchScene& scene, const Network& network,
                                           const std::filesystem::path& folder);
 

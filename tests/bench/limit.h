@@ -1,4 +1,4 @@
-// bench: what the machine could do at most, measured, and what a form asks of it.
+// bench: the machine's peak arithmetic rate, measured, and the arithmetic of a form.
 #pragma once
 
 #include <optional>
@@ -9,12 +9,12 @@
 
 namespace ressort::bench {
 
-// Multiply-adds (or, without FMA, multiplications with additions) of one core in a nanosecond, from
-// registers.
+// Measures the multiply-adds per ns of one core on registers; without FMA, pairs of a
+// multiplication and an addition.
 double multiply_adds_per_ns(Isa isa, bool is_double);
 
-// What the form's arithmetic takes for a sample of one voice when nothing touches, whatever it
-// costs to fetch the numbers. Nothing where the form does not say.
+// Returns the multiply-adds of the form for a sample of one voice if nothing touches, without
+// memory accesses. Nothing for forms whose count is not known.
 std::optional<double> multiply_adds(const Program& program);
 
 }  // namespace ressort::bench

@@ -1,5 +1,6 @@
-// What the product costs: every scene in every method and precision, beside the textbook simulator
-// and, if asked for, beside what FAUST makes of the same model. See `run --help`.
+// Measures the cost of every scene in every method and precision, beside a textbook simulator and,
+// with
+// --faust, beside FAUST's code for the same model. See `run --help`.
 #include <fnmatch.h>
 #include <unistd.h>
 
@@ -17,7 +18,6 @@
 #include "core/compile/plan.h"
 #include "core/model/language/mdl.h"
 #include "tests/bench/figures.h"
-#include "tests/bench/fit.h"
 #include "tests/bench/limit.h"
 #include "tests/bench/measure.h"
 #include "tests/bench/report.h"
@@ -33,19 +33,16 @@ constexpr std::size_t most_faust_elements = 3000;
 
 const char* const usage =
     "usage: tests/bench/run [OPTION...] [SCENE...]\n"
-    "  SCENE        a name or a pattern such as 'chain-*'; without one, all\n"
-    "  --faust      beside the exported model, compiled by faust and g++ and clang++\n"
-    "  --fit        measures what the plan reckons with, over sizes, and writes it as\n"
-    "               core/kernels/prices/*.h for this instruction set; two minutes\n"
-    "  --quick      a glance: less exact\n"
-    "  --isa NAME   base, v3 or v4; without it, the best of this machine\n"
-    "  --seconds S  to measure each scene for; 4 without it\n"
-    "  -o DIR       where bench.csv, cost.svg and faust.svg go; build/bench without it\n"
-    "  --list       the scenes' names\n";
+    "  SCENE        name or pattern such as 'chain-*' (default: all)\n"
+    "  --faust      compare with the exported model, compiled by faust, g++ and clang++\n"
+    "  --quick      measure briefly and less accurately\n"
+    "  --isa NAME   instruction set: base, v3 or v4 (default: the best of this machine)\n"
+    "  --seconds S  time for each scene (default 4)\n"
+    "  -o DIR       output folder (default build/bench): bench.csv, cost.svg, faust.svg\n"
+    "  --list       print the names of the scenes\n";
 
 struct Options {
   bool faust = false;
-  bool fits = false;
   bool lists = false;
   Isa isa = best_isa();
   double seconds = 4.0;
@@ -55,7 +52,7 @@ struct Options {
 
 volatile std::sig_atomic_t stops = 0;  // Ctrl-C
 
-// Of what this machine has.
+// Returns an instruction set by name if this machine has it.
 std::optional<Isa> isa_of(const std::string& name) {
   constexpr std::array<std::pair<const char*, Isa>, 3> all{
       {{"base", Isa::base}, {"v3", Isa::v3}, {"v4", Isa::v4}}};
@@ -77,8 +74,6 @@ std::optional<Options> read(const std::vector<std::string>& arguments) {
     }
     if (argument == "--faust") {
       options.faust = true;
-    } else if (argument == "--fit") {
-      options.fits = true;
     } else if (argument == "--list") {
       options.lists = true;
     } else if (argument == "--quick") {
@@ -137,7 +132,7 @@ void draw(const plot::Figure& figure, const std::filesystem::path& path) {
 
 // --- one scene ----------------------------------------------------------------------------------
 
-// The machine in every form that it has.
+// Returns the machine in every form that it has.
 std::vector<Formed> forms_of(const Machine& machine) {
   std::vector<Formed> forms;
   for (const Method method : methods_for(KernelRow::Use::published)) {
@@ -163,9 +158,12 @@ void add_ours(const BenchScene& scene, const Network& network, const std::vector
     kernels.back().calibrate();
   }
   const Precision precision = is_double ? Precision::float64 : Precision::float32;
+  // The plan of `play` after it has measured the forms.
+  const Timings timings{.time = time_of, .recall = {}, .keep = {}};
   const Planned planned =
       make_plan(forms.front().machine,
-                {.is_double = is_double, .isa = isa, .voices = static_cast<int>(scene.voices)});
+                {.is_double = is_double, .isa = isa, .voices = static_cast<int>(scene.voices)}, {},
+                patient_modes, {}, {}, {}, {.timings = &timings, .forms = {}});
   all.emplace_back("ressort", is_double,
                    play_engine(scene, network, planned.machine, precision, isa));
   all.back().form = method_name(planned.parts.front().method);
@@ -173,18 +171,11 @@ void add_ours(const BenchScene& scene, const Network& network, const std::vector
   std::move(kernels.begin(), kernels.end(), std::back_inserter(all));
 }
 
-Workload load_of(const BenchScene& scene, bool is_double, Isa isa) {
-  return {.is_double = is_double,
-          .isa = isa,
-          .voices = static_cast<int>(scene.voices),
-          .moving = scene.turns.empty() ? 0.0 : 1.0};
-}
-
 std::string faust_name(const FaustLibrary& library) {
   return "faust " + library.variant;
 }
 
-// How many times faster the row is than all others of the same scene.
+// Fills the row's speed ratios to all others of the same scene.
 void compare(Row& row, const std::vector<Timed>& all, const std::vector<FaustLibrary>& libraries) {
   for (const Timed& one : all) {
     if (one.method == "reference") {
@@ -206,21 +197,17 @@ void compare(Row& row, const std::vector<Timed>& all, const std::vector<FaustLib
   }
 }
 
-// What the machine can do at most.
+// The machine's peak arithmetic rate.
 struct Limits {
   double double_per_ns = 0.0;  // multiply-adds
   double float_per_ns = 0.0;
 };
 
-void compare(Row& row, const BenchScene& scene, const std::vector<Formed>& forms,
-             const Limits& limits, Isa isa) {
+void compare(Row& row, const std::vector<Formed>& forms, const Limits& limits) {
   const auto form = std::find_if(forms.begin(), forms.end(),
                                  [&](const Formed& formed) { return formed.method == row.method; });
   if (form == forms.end()) {
     return;
-  }
-  if (scene.is_worst) {
-    row.predicted_ns = predicted_ns(form->machine.parts[0], load_of(scene, row.is_double, isa));
   }
   if (const auto work = multiply_adds(form->machine.parts[0])) {
     const double least_ns = *work * static_cast<double>(row.voices) /
@@ -267,7 +254,7 @@ std::vector<Row> measure_scene(const BenchScene& scene, const Network& network,
                     .lower_ns = one.quantile(0.25),
                     .upper_ns = one.quantile(0.75)});
     compare(rows.back(), all, libraries);
-    compare(rows.back(), scene, forms, limits, options.isa);
+    compare(rows.back(), forms, limits);
   }
   return rows;
 }
@@ -301,9 +288,6 @@ bool prepare(Prepared& prepared, const Options& options) {
 int run(const Options& options) {
   std::vector<Prepared> wanted;
   std::vector<BenchScene> scenes = all_scenes();
-  if (!options.patterns.empty()) {
-    std::ranges::move(fit_scenes(), std::back_inserter(scenes));
-  }
   for (BenchScene& scene : scenes) {
     if (options.lists) {
       std::printf("%s\n", scene.name.c_str());
@@ -317,7 +301,7 @@ int run(const Options& options) {
   std::filesystem::create_directories(options.folder);
   const std::string isa(isa_name(options.isa));
   std::printf("%s\n", machine_line(isa).c_str());
-  // The compilers run on all cores, before anything is measured.
+  // The compilers run on all cores, so they finish before anything is measured.
   for (std::size_t i = 0; i < wanted.size() && options.faust && stops == 0; ++i) {
     show_progress(i, wanted.size(), "FAUST compiles " + wanted[i].scene.name);
     if (!prepare(wanted[i], options)) {
@@ -344,78 +328,12 @@ int run(const Options& options) {
     rows.insert(rows.end(), found.begin(), found.end());
     wanted[i] = {};
   }
-  print_predictions(rows);
   print_regrets(rows);
   const bool is_written = write_csv(options.folder / "bench.csv", isa, rows);
   const std::string machine = machine_line(isa);
   draw(cost_figure(machine, rows), options.folder / "cost.svg");
   draw(faust_figure(machine, rows), options.folder / "faust.svg");
   return stops != 0 ? 130 : is_written ? 0 : 1;
-}
-
-// --- prices -------------------------------------------------------------------------------------
-
-void add_samples(const BenchScene& scene, const Options& options, std::vector<Sample>& samples) {
-  constexpr double seconds = 0.1;
-  constexpr double most_dear = 100.0;  // times the cheapest: nobody would take it
-  Prepared prepared{scene, {}, {}};
-  if (!prepare(prepared, options)) {
-    return;
-  }
-  const std::vector<Formed> forms = forms_of(make_machine(prepared.network, rate_hz, true));
-  std::vector<Timed> all;
-  std::vector<Sample> found;
-  for (const bool is_double : {true, false}) {
-    const Workload load = load_of(scene, is_double, options.isa);
-    double least_ns = std::numeric_limits<double>::infinity();
-    for (const Formed& formed : forms) {
-      const Program& program = formed.machine.parts[0];
-      const KernelRow& row = row_of(program.form);
-      all.emplace_back(formed.method, is_double,
-                       is_double
-                           ? play_kernels<double>(scene, prepared.network, program, options.isa)
-                           : play_kernels<float>(scene, prepared.network, program, options.isa));
-      const double ns = all.back().calibrate();
-      least_ns = std::min(least_ns, ns);
-      if (ns > most_dear * least_ns) {
-        all.pop_back();
-        continue;
-      }
-      found.push_back({scene.name, row.method, is_double, row.work(program, load), ns});
-    }
-  }
-  measure(all, seconds, stops);
-  for (std::size_t i = 0; i < all.size() && all[i].has_played(); ++i) {
-    found[i].ns = all[i].quantile(0.25);
-    samples.push_back(found[i]);
-  }
-}
-
-int fit(const Options& options) {
-  if (!std::filesystem::exists(path_of(options.isa))) {
-    std::fprintf(stderr, "--fit is for the folder of the source\n");
-    return 2;
-  }
-  stay_on_one_core();
-  const DenormalsFlushed flushed;
-  std::vector<BenchScene> scenes = fit_scenes();
-  for (BenchScene& scene : all_scenes()) {
-    if (scene.is_worst) {
-      scenes.push_back(std::move(scene));
-    }
-  }
-  std::vector<Sample> samples;
-  for (std::size_t i = 0; i < scenes.size() && stops == 0; ++i) {
-    show_progress(i, scenes.size(), scenes[i].name);
-    add_samples(scenes[i], options, samples);
-  }
-  show_progress(scenes.size(), scenes.size(), "");
-  if (stops != 0) {
-    return 130;
-  }
-  const Prices prices = fitted(prices_of(options.isa), samples);
-  print_errors(prices, samples);
-  return write(prices, options.isa, machine_line(std::string(isa_name(options.isa)))) ? 0 : 1;
 }
 
 }  // namespace
@@ -428,5 +346,5 @@ int main(int argc, char** argv) {
     std::fputs(usage, stderr);
     return 2;
   }
-  return options->fits ? fit(*options) : run(*options);
+  return run(*options);
 }

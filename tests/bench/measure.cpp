@@ -9,9 +9,9 @@
 namespace ressort::bench {
 namespace {
 
-constexpr double longest_cycle_ns = 60e6;  // that is played as a whole
+constexpr double longest_cycle_ns = 60e6;  // a longer cycle is not played as a whole
 constexpr double round_ns = 2e6;
-constexpr double long_round_ns = 10e6;  // where a cycle is too long
+constexpr double long_round_ns = 10e6;  // if a cycle is too long
 constexpr std::size_t least_rounds = 3;
 constexpr std::size_t most_rounds = 400;
 
@@ -83,6 +83,12 @@ void measure(std::vector<Timed>& all, double seconds, const volatile std::sig_at
       one.play_round();
     }
   }
+}
+
+double time_of(const kernels::Program&, const std::function<void()>& play) {
+  const double start = cpu_ns();
+  play();
+  return cpu_ns() - start;
 }
 
 void stay_on_one_core() {

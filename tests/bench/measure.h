@@ -1,8 +1,9 @@
-// bench: how long players take, in turns, in CPU time of this thread.
+// bench: measures players in turns, in CPU time of this thread.
 #pragma once
 
 #include <algorithm>
 #include <csignal>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -11,24 +12,24 @@
 
 namespace ressort::bench {
 
-// A player, and what it took: nanoseconds per sample, one number for every round.
+// A player and its measurements: ns per sample, one number per round.
 class Timed {
  public:
   Timed(std::string method_in, bool is_double_in, std::unique_ptr<Player> player);
 
-  // How long it takes, roughly; and from it how much it plays in a round: whole cycles while they
-  // are short, else a few blocks.
+  // Measures the player briefly, returns ns per sample, and chooses how much it plays in a round:
+  // whole cycles if they are short, else a few blocks.
   double calibrate();
   void play_round();
 
   bool has_played() const { return !took_.empty(); }
-  // ns per sample, which so great a share of the rounds took less than; it has played
+  // Returns the quantile `share` of the rounds, in ns per sample. The player must have played.
   double quantile(double share) const;
   double median() const { return quantile(0.5); }
   double minimum() const;
 
   std::string method;
-  std::string form;  // that an engine plays, for people
+  std::string form;  // that an engine plays, for printing
   bool is_double;
 
  private:
@@ -39,11 +40,15 @@ class Timed {
   std::vector<double> took_;
 };
 
-// Rounds in which each plays in turn, until `seconds` have passed; at least three unless `stops`.
-// What is too small to hear is taken for 0.
+// Plays rounds in which each player plays in turn, until `seconds` have passed, and at least three
+// rounds unless `stops`. The caller has flushed denormals.
 void measure(std::vector<Timed>& all, double seconds, const volatile std::sig_atomic_t& stops);
 
-// This thread stays on the core that it is on.
+// Binds this thread to the core that it runs on.
 void stay_on_one_core();
+
+// Returns the CPU time of `play` in this thread, in ns, as Timings::time. The caller has flushed
+// denormals.
+double time_of(const kernels::Program& program, const std::function<void()>& play);
 
 }  // namespace ressort::bench

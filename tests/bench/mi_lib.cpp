@@ -11,7 +11,7 @@ namespace {
 
 using Words = std::vector<std::string>;
 
-// The library's word for a law; "" where it has none.
+// Returns the library's name of a law; "" if it has none.
 const char* word_of(Law law) {
   switch (law) {
     case Law::spring:
@@ -115,12 +115,12 @@ class MiLibWriter {
                                    : faust_formula(network_.arguments[argument], parameters_);
   }
 
-  // Where it was one sample before the first.
+  // Returns the position one sample before the first.
   std::string before(const Mass& mass) const {
     return faust_number(mass.position - (moves(mass) ? initial_velocity(network_, mass) : 0.0));
   }
 
-  // A force goes into each, a position comes out.
+  // Each mass takes a force and returns a position.
   Words masses() {
     Words words;
     for (const Mass& mass : network_.masses) {
@@ -156,7 +156,7 @@ class MiLibWriter {
     return input == network_.inputs.end() ? "0.0" : channel(input->number);
   }
 
-  // The positions of both ends go into each, the forces on them come out.
+  // Each link takes the positions of both ends and returns the forces on them.
   Words links() {
     Words words;
     for (const Link& link : network_.links) {
@@ -190,9 +190,9 @@ class MiLibWriter {
   }
 
   const Network& network_;
-  Words parameters_;           // what formulas call them
+  Words parameters_;           // their names in formulas
   std::vector<Words> forces_;  // [mass]
-  Words ends_;                 // positions that go into links, in their order
+  Words ends_;                 // positions that are inputs of links, in their order
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-// bench: a network in the words of FAUST's own mass-interaction library, mi.lib.
+// bench: writes a network with FAUST's own mass-interaction library, mi.lib.
 #pragma once
 
 #include <optional>
@@ -9,9 +9,10 @@
 
 namespace ressort::bench {
 
-// Masses, then links, then masses again, as mi.lib's loop has it; process takes in1, in2, ... and
-// returns out1, out2, ...; parameters are sliders of their names. Nothing for macros, bodies and
-// waveguides, outputs of forces, laws that mi.lib lacks and numbers of masses that audio drives.
+// Returns a FAUST program in the form of mi.lib's loop: masses, links, masses again. `process`
+// takes in1, in2, ... and returns out1, out2, ...; parameters are sliders of the same names.
+// Nothing for macros, bodies, waveguides, force outputs, laws that mi.lib lacks, and masses whose
+// numbers are driven by audio.
 std::optional<std::string> mi_lib_text(const Network& network);
 
 }  // namespace ressort::bench

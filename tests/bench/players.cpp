@@ -10,10 +10,10 @@
 namespace ressort::bench {
 namespace {
 
-constexpr std::size_t ramp_frames = 882;  // of a parameter, as the engine's own at 44 100 Hz
+constexpr std::size_t ramp_frames = 882;  // of a parameter, as in the engine at 44 100 Hz
 static_assert(block_frames <= max_block_frames && ramp_frames > block_frames);
 
-// Of the stiffness, for one voice of many.
+// Returns the stiffness factor of one voice of many.
 double pitch(const BenchScene& scene, std::size_t voice) {
   return 1.0 + 0.5 * static_cast<double>(voice) / static_cast<double>(scene.voices);
 }
@@ -47,7 +47,7 @@ class KernelPlayer : public Player {
     outputs_.resize(block_frames * program_.outputs.size() * width_);
   }
 
-  // Where parameters move, all of their coefficients do, throughout: they never arrive.
+  // All coefficients of a moving parameter ramp all the time and never reach their targets.
   void move(std::vector<std::uint32_t> parameters, const BenchScene& scene) {
     for (const std::uint32_t parameter : parameters) {
       const auto& depending = program_.depending[parameter];
@@ -164,8 +164,8 @@ class EnginePlayer : public Player {
     return playing;
   }
 
-  // A held voice never sleeps. The one that an engine starts with, the model as it is written,
-  // falls asleep first where it is at rest: as many are stepped as keys are held.
+  // A held voice never sleeps. The voice that an engine starts with falls asleep first if it is at
+  // rest, so that exactly the held keys are stepped.
   void hold_keys(std::size_t voices) {
     for (std::size_t block = 0; block < 1000 && engine_.meters().stepped > 0; ++block) {
       engine_.process({}, {}, output_pointers_, block_frames);

@@ -1,4 +1,4 @@
-// bench: the ways of playing a scene, block by block. All of them play the same hands.
+// bench: players of a scene, block by block, with the same motion of the inputs.
 #pragma once
 
 #include <cstddef>
@@ -20,25 +20,25 @@ class Player {
   virtual void play(std::size_t block) = 0;  // of the cycle
 };
 
-// The network of a scene, in one of its forms.
+// The network of a scene in one of its forms.
 struct Formed {
   std::string method;
-  Machine machine;  // of one part
+  Machine machine;  // has one part
 };
 
-// The kernels alone, as many as the voices need.
+// Plays the kernels alone, as many as the voices need.
 template <class T>
 std::unique_ptr<Player> play_kernels(const BenchScene& scene, const Network& network,
                                      const Program& program, Isa isa);
 
-// The whole engine with all its guards, notes held.
+// Plays the whole engine with its guards, with held notes.
 std::unique_ptr<Player> play_engine(const BenchScene& scene, const Network& network,
                                     const Machine& machine, Precision precision, Isa isa);
 
-// The textbook simulator, one voice.
+// Plays the textbook simulator with one voice.
 std::unique_ptr<Player> play_reference(const BenchScene& scene, const Network& network);
 
-// A program of FAUST's for each voice.
+// Plays one FAUST program for each voice.
 std::unique_ptr<Player> play_faust(const BenchScene& scene, const Network& network,
                                    const FaustLibrary& library);
 

@@ -8,8 +8,7 @@
 namespace ressort::bench {
 namespace {
 
-constexpr double tolerated_error = 0.2;      // of a prediction
-constexpr double budget_ns = 1e9 / 48000.0;  // of one core, per sample
+constexpr double budget_ns = 1e9 / 48000.0;  // of one core per sample
 
 const char* precision_of(const Row& row) {
   return row.is_double ? "double" : "float";
@@ -55,11 +54,10 @@ std::string machine_line(const std::string& isa) {
 }
 
 void print_head() {
-  std::printf("%-26s %-6s %-20s %10s %10s %9s %7s %7s %10s %11s  %s\n", "", "", "", "median",
-              "minimum", "ns/mass", "% core", "% of", "times", "predicted",
-              "times faster than FAUST");
-  std::printf("%-26s %-6s %-20s %10s %10s %9s %7s %7s %10s %11s  %s\n", "scene", "", "method",
-              "ns/sample", "ns/sample", "/sample", "48 kHz", "limit", "reference", "/ measured",
+  std::printf("%-26s %-6s %-20s %10s %10s %9s %7s %7s %10s  %s\n", "", "", "", "median", "minimum",
+              "ns/mass", "% core", "% of", "times", "times faster than FAUST");
+  std::printf("%-26s %-6s %-20s %10s %10s %9s %7s %7s %10s  %s\n", "scene", "", "method",
+              "ns/sample", "ns/sample", "/sample", "48 kHz", "limit", "reference",
               "best (default)");
 }
 
@@ -70,35 +68,17 @@ void print(const std::vector<Row>& rows) {
       faust += " (" + ratio(row.than_default_faust) + ")";
     }
     const std::string limit = row.of_limit ? number("%.0f", 100.0 * *row.of_limit) : "";
-    std::string predicted;
-    if (row.predicted_ns) {
-      const double times = *row.predicted_ns / row.median_ns;
-      predicted = (std::abs(times - 1.0) > tolerated_error ? "! " : "") + number("%.2f", times);
-    }
-    std::printf("%-26s %-6s %-20s %10.4g %10.4g %9.3g %7.3g %7s %10s %11s  %s\n", row.scene.c_str(),
+    std::printf("%-26s %-6s %-20s %10.4g %10.4g %9.3g %7.3g %7s %10s  %s\n", row.scene.c_str(),
                 precision_of(row), shown_method(row).c_str(), row.median_ns, row.minimum_ns,
                 ns_per_mass(row), 100.0 * row.median_ns / budget_ns, limit.c_str(),
-                ratio(row.than_reference).c_str(), predicted.c_str(), faust.c_str());
+                ratio(row.than_reference).c_str(), faust.c_str());
   }
   std::fflush(stdout);
 }
 
-void print_predictions(const std::vector<Row>& rows) {
-  std::size_t all = 0;
-  std::size_t within = 0;
-  for (const Row& row : rows) {
-    if (row.predicted_ns) {
-      ++all;
-      within += std::abs(*row.predicted_ns / row.median_ns - 1.0) <= tolerated_error ? 1 : 0;
-    }
-  }
-  std::printf("Predictions within a fifth of what was measured: %zu of %zu; ! marks the others\n",
-              within, all);
-}
-
 void print_regrets(const std::vector<Row>& rows) {
   constexpr double tolerated = 1.1;
-  std::printf("Kernels that were faster than the one that the plan chose:\n");
+  std::printf("Scenes in which another kernel was faster than the chosen one:\n");
   double worst = 1.0;
   for (const Row& engine : rows) {
     if (engine.form.empty()) {
@@ -122,10 +102,10 @@ void print_regrets(const std::vector<Row>& rows) {
     if (times > tolerated) {
       std::printf("  %-26s %-6s %s, not %s: %.2f times%s\n", engine.scene.c_str(),
                   precision_of(engine), fastest->method.c_str(), chosen->method.c_str(), times,
-                  engine.is_worst ? "" : "; not at its worst here");
+                  engine.is_worst ? "" : "; not everything touches here");
     }
   }
-  std::printf("  where all touches all the time, at most %.2f times is lost\n", worst);
+  std::printf("  worst loss with everything touching: %.2f times\n", worst);
 }
 
 bool write_csv(const std::filesystem::path& path, const std::string& isa,
@@ -133,8 +113,7 @@ bool write_csv(const std::filesystem::path& path, const std::string& isa,
   std::ofstream file(path);
   file << "scene,precision,method,form,isa,masses,links,voices,median_ns,minimum_ns,lower_ns,upper_"
           "ns,ns_per_mass,"
-          "core_share,share_of_limit,times_reference,times_best_faust,times_default_faust,"
-          "predicted_ns\n";
+          "core_share,share_of_limit,times_reference,times_best_faust,times_default_faust\n";
   for (const Row& row : rows) {
     file << row.scene << ',' << precision_of(row) << ',' << row.method << ',' << row.form << ','
          << isa << ',' << row.masses << ',' << row.links << ',' << row.voices << ','
@@ -142,8 +121,7 @@ bool write_csv(const std::filesystem::path& path, const std::string& isa,
          << number("%.6g", row.lower_ns) << ',' << number("%.6g", row.upper_ns) << ','
          << number("%.6g", ns_per_mass(row)) << ',' << number("%.6g", row.median_ns / budget_ns)
          << ',' << ratio(row.of_limit) << ',' << ratio(row.than_reference) << ','
-         << ratio(row.than_best_faust) << ',' << ratio(row.than_default_faust) << ','
-         << ratio(row.predicted_ns) << '\n';
+         << ratio(row.than_best_faust) << ',' << ratio(row.than_default_faust) << '\n';
   }
   file.close();
   return file.good();

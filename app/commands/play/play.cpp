@@ -23,6 +23,8 @@
 #include "app/realtime/thread_pool.h"
 #include "app/say.h"
 #include "app/session/load_progress.h"
+#include "app/session/timing.h"
+#include "app/session/wisdom.h"
 #include "app/text.h"
 
 namespace ressort::commands {
@@ -111,7 +113,9 @@ class Player {
                                                  .third = options_.third,
                                                  .keys = options_.keys,
                                                  .watch = options_.watch,
-                                                 .keeps_flights = true},
+                                                 .keeps_flights = true,
+                                                 .time = cpu_time_ns,
+                                                 .wisdom_path = wisdom_path()},
                                   [this](const std::string& news) { tell(news); });
     connect_session();
     if (options_.panel.port != 0) {

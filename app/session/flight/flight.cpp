@@ -51,6 +51,7 @@ Result<std::unique_ptr<Engine>> make_flight_engine(const Flight& flight,
                                    .method = setup.method,
                                    .budget = setup.budget,
                                    .most_modes = engine.most_modes,
+                                   .forms = engine.forms,
                                    .find_gain = engine.find_gain,
                                    .force = engine.force});
   if (!compiled) {

@@ -28,7 +28,8 @@ struct FlightEngine {
   std::uint32_t most_modes = 0;
   bool find_gain = false;
   bool force = false;
-  double gain = 1.0;  // of the compiled preset, which may differ from its text
+  double gain = 1.0;               // of the compiled preset, which may differ from its text
+  std::vector<std::string> forms;  // of its plan, which depends on measurements; see Choice
 };
 
 // Options common to all engines.

@@ -257,6 +257,8 @@ class FlightReader {
       return read_text(words);
     } else if (key == "engine") {
       return read_engine(words);
+    } else if (key == "form" && !flight_.engines.empty()) {
+      flight_.engines.back().forms.push_back(words.rest());
     } else if (key == "kept" && !flight_.engines.empty()) {
       const double value = words.number(-most_number, most_number);
       flight_.engines.back().kept.push_back({words.rest(), value});
@@ -376,6 +378,9 @@ std::string print_flight(const Flight& flight) {
     out.line("engine", written->second, engine.number, engine.serial, engine.lets_ring ? 1 : 0,
              engine.has_new_numbers ? 1 : 0, engine.rate_hz, engine.most_modes,
              engine.find_gain ? 1 : 0, engine.force ? 1 : 0, engine.gain, engine.path);
+    for (const std::string& form : engine.forms) {
+      out.line("form", form);
+    }
     for (const Setting& setting : engine.kept) {
       out.line("kept", setting.value, setting.parameter);
     }

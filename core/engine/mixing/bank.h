@@ -189,7 +189,7 @@ struct Bank : BlockBuffers<T> {
         return {};
       }
     }
-    together.kernel_ns = predicted_ns(part.program, {.is_double = std::is_same_v<T, double>,
+    together.kernel_ns = estimated_ns(part.program, {.is_double = std::is_same_v<T, double>,
                                                      .isa = isa,
                                                      .voices = static_cast<int>(part.width)});
     together.wanted.reserve(tasks.size());

@@ -54,29 +54,21 @@ std::optional<Batch> batch_form(const Program& program) {
   return batch;
 }
 
-// A single pack is bound by latency. With more than most_held_masses everything goes through
-// memory.
-Work work(const Program& program, const Batch&, const Workload& load) {
+// A single pack waits for its own last result, so that its operations count about twice. More than
+// most_held_masses masses go through memory.
+double operations(const Program& program, const Batch&, const Workload& load) {
   const LinkCount links = links_of(program);
   const double others = links.bent + links.others;
   const double packs = packs_of(load);
-  Work work;
-  work.add(Item::batch_passive, packs * passive_ns(program));
+  const double passive = packs * passive_operations(program);
   if (program.moving > most_held_masses) {
     const double steps = program.moving + links.springs + others;
-    return work.add(Item::batch_sample, 1.0)
-        .add(Item::batch_wide_step, steps)
-        .add(Item::batch_wide_pull, packs * steps)
-        .add(Item::batch_wide_link, packs * others);
+    return passive + 16.0 + 2.0 * steps + packs * (5.0 * steps + 10.0 * others);
   }
   if (packs <= 1.0) {
-    return work.add(Item::batch_one, 1.0)
-        .add(Item::batch_one_mass, program.moving)
-        .add(Item::batch_one_link, others);
+    return passive + 24.0 + 8.0 * program.moving + 22.0 * others;
   }
-  return work.add(Item::batch_sample, 1.0)
-      .add(Item::batch_pull, packs * (program.moving + links.springs))
-      .add(Item::batch_link, packs * others);
+  return passive + 16.0 + packs * (3.5 * (program.moving + links.springs) + 12.0 * others);
 }
 
 std::string description(const Program& program, const Batch&) {

@@ -47,7 +47,7 @@ inline constexpr std::uint32_t most_batch_masses = 16;
 std::optional<Batch> batch_form(const Program& program);
 
 // Functions for the registry's row; memory is per voice, in bytes.
-Work work(const Program& program, const Batch& form, const Workload& load);
+double operations(const Program& program, const Batch& form, const Workload& load);
 std::string description(const Program& program, const Batch& form);
 std::uint64_t voice_bytes(const Program& program, const Batch& form, std::uint64_t number_bytes);
 

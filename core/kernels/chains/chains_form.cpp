@@ -331,46 +331,33 @@ std::optional<Chains> chains_form(const Program& program, const Progress& progre
   return ChainFinder(program, progress).find();
 }
 
-Work work(const Program& program, const Chains& form, const Workload& load) {
-  const double voices = load.voices;
+// Counts per voice: a chain that stays in registers costs three operations a pack of masses, one in
+// memory as many and the turn at its ends. Everything else is stepped number by number.
+double operations(const Program& program, const Chains& form, const Workload& load) {
   const FoldedBy by = fold_by(program, form, load.isa, load.is_double ? 8 : 4);
-  Work work;
+  double count = 0.0;
   if (by.short_packs > 0) {
-    work.add(Item::chains_short_sample, voices)
-        .add(Item::chains_short_pack, voices * static_cast<double>(by.short_packs))
-        .add(Item::chains_moving_pair, load.moving * voices * static_cast<double>(by.short_packs));
+    count += 20.0 + 3.0 * static_cast<double>(by.short_packs);
   } else {
-    const auto lanes = static_cast<double>(by.lanes);
-    const bool is_wide = 2.0 * lanes * bytes_of_number(load) > 64.0;
-    work.add(Item::chains_sample, voices);
+    count += 24.0;
     for (const Chain& chain : form.chains) {
-      const double pairs = voices * std::ceil(chain.count / lanes);
-      work.add(Item::chains_chain, voices)
-          .add(is_wide ? Item::chains_wide_pair : Item::chains_pair, pairs)
-          .add(Item::chains_moving_pair, load.moving * pairs);
-      if (chain.is_stiff) {
-        work.add(Item::chains_stiff_chain, voices).add(Item::chains_stiff_pair, pairs);
-      }
+      const double packs = std::ceil(chain.count / static_cast<double>(by.lanes));
+      count += 8.0 + 3.0 * packs + (chain.is_stiff ? 96.0 + 5.0 * packs : 0.0);
     }
     const double bytes = 2.0 * bytes_of_number(load) * static_cast<double>(form.nodes.size());
-    work.add(Item::chains_line, voices * lines_of(bytes))
-        .add(Item::chains_far_line, voices * far_lines_of(bytes));
+    count += 1.5 * lines_of(bytes) + 6.0 * far_lines_of(bytes);
   }
-  work.add(Item::chains_held, form.links.empty() ? 0.0 : voices);
+  count += form.links.empty() ? 0.0 : 16.0;
   for (const std::uint32_t link : form.links) {
     const auto run =
         std::find_if(program.link_runs.begin(), program.link_runs.end(),
                      [&](const LinkRun& r) { return link >= r.first && link < r.first + r.count; });
-    if (run->scheme == Scheme::plain) {
-      const bool is_cheap = is_linear(run->law) || facts_of(run->law).is_straight;
-      work.add(is_cheap ? Item::chains_spring : Item::chains_link, voices);
-    }
+    count += run->scheme == Scheme::plain ? 11.0 : 0.0;
   }
-  return work.add(Item::chains_loose, voices * static_cast<double>(form.loose.size()))
-      .add(Item::chains_signal,
-           voices * static_cast<double>(program.inputs.size() + program.outputs.size()))
-      .add(Item::chains_place, voices * static_cast<double>(program.taps.size()))
-      .add(Item::chains_passive, voices * passive_ns(program));
+  return load.voices *
+         (count + 13.0 * static_cast<double>(form.loose.size()) +
+          static_cast<double>(program.inputs.size() + program.outputs.size()) +
+          80.0 * static_cast<double>(program.taps.size()) + passive_operations(program));
 }
 
 std::string description(const Program&, const Chains& form) {

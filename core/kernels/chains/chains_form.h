@@ -62,7 +62,7 @@ struct FoldedBy {
 FoldedBy fold_by(const Program& program, const Chains& form, Isa isa, std::size_t number_bytes);
 
 // Functions for the registry's row; memory is per voice, in bytes.
-Work work(const Program& program, const Chains& form, const Workload& load);
+double operations(const Program& program, const Chains& form, const Workload& load);
 std::string description(const Program& program, const Chains& form);
 std::uint64_t voice_bytes(const Program& program, const Chains& form, std::uint64_t number_bytes);
 

@@ -9,33 +9,24 @@
 
 namespace ressort::kernels {
 
-// Points on macros are computed lane by lane, points on bodies over all modes in packs.
-Work work(const Program& program, const Direct&, const Workload& load) {
+// Counts per pack of voices: a mass costs three operations, a spring four, any other law a branch
+// and twice as many. A point on a macro is interpolated lane by lane, a body's place by all modes.
+double operations(const Program& program, const Direct&, const Workload& load) {
   const double packs = packs_of(load);
   const double widest = static_cast<double>(vector_bytes(load.isa)) / bytes_of_number(load);
   const double lanes = std::ceil(load.voices / widest) * std::min<double>(load.voices, widest);
   const LinkCount links = links_of(program);
-  const auto waves = static_cast<double>(program.waveguides.size() + program.junctions.size());
-  const double full = lanes > widest / 2.0 ? packs : 0.0;
-  Work work;
-  work.add(Item::direct_sample, packs)
-      .add(Item::direct_mass, packs * program.moving)
-      .add(Item::direct_spring, packs * (links.springs + links.bent))
-      .add(Item::direct_link, packs * links.others)
-      .add(Item::direct_full_step, full * (program.moving + links.springs + links.bent))
-      .add(Item::direct_full_link, full * links.others)
-      .add(Item::direct_passive, packs * passive_ns(program))
-      .add(Item::direct_waveguide, lanes * waves)
-      .add(Item::direct_waveguide_pack, packs * waves);
+  double count = 48.0 + 3.0 * program.moving + 4.0 * (links.springs + links.bent) +
+                 16.0 * links.others + 1.5 * passive_operations(program) +
+                 6.0 * static_cast<double>(program.waveguides.size() + program.junctions.size());
+  double places = 0.0;
   for (const TapSlot& tap : program.taps) {
-    tap.is_on_body() ? work.add(Item::direct_body_mode, packs * tap.length)
-                     : work.add(Item::direct_place, lanes);
+    (tap.is_on_body() ? count : places) += tap.is_on_body() ? 5.0 * tap.length : 100.0;
   }
   const double numbers = 3.0 * std::max(2.0, std::min<double>(load.voices, widest));
   const double bytes = numbers * bytes_of_number(load) * program.moving +
                        8.0 * static_cast<double>(program.ends.size());
-  return work.add(Item::direct_line, packs * lines_of(bytes))
-      .add(Item::direct_far_line, packs * far_lines_of(bytes));
+  return packs * (count + 2.0 * lines_of(bytes) + 10.0 * far_lines_of(bytes)) + lanes * places;
 }
 
 std::string description(const Program& program, const Direct&) {

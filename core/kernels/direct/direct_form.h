@@ -8,12 +8,11 @@ namespace ressort::kernels {
 
 struct Program;
 struct Workload;
-class Work;
 
 // The network as it is written, one voice in each lane. It needs no tables.
 struct Direct {};
 
-Work work(const Program& program, const Direct& form, const Workload& load);
+double operations(const Program& program, const Direct& form, const Workload& load);
 std::string description(const Program& program, const Direct& form);
 std::uint64_t voice_bytes(const Program& program, const Direct& form, std::uint64_t number_bytes);
 

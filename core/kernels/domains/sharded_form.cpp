@@ -62,16 +62,17 @@ Meeting best_meeting(std::span<const std::vector<std::size_t>> at_level, double 
   return best;
 }
 
-// The time of the slowest worker; with several shards each, plus the cost of cache misses when it
-// returns to a shard.
-double predicted_ns(const Program&, const Shards& form, const Workload& load) {
+// Returns the operations of the slowest worker. A worker with several shards also fetches each of
+// them from memory again.
+double operations(const Program&, const Shards& form, const Workload& load) {
   const std::vector<Shard>& shards = *form.shards;
   const std::size_t workers = std::min(form.executor->size(), shards.size());
   const double first_share = shards.size() > workers ? return_share : 0.0;
-  return slowest_worker_ns(shards.size(), workers, form.frames, [&](std::size_t i) {
-    return (1.0 + first_share / form.frames) * predicted_ns(shards[i].program, load) +
+  const auto own_ns = [&](std::size_t i) {
+    return (1.0 + first_share / form.frames) * estimated_ns(shards[i].program, load) +
            copy_ns * static_cast<double>(shards[i].copies.size()) / form.frames;
-  });
+  };
+  return slowest_worker_ns(shards.size(), workers, form.frames, own_ns) / nominal_ns;
 }
 
 std::string description(const Program&, const Shards& form) {

@@ -66,7 +66,7 @@ Meeting best_meeting(std::span<const std::vector<std::size_t>> at_level, double 
                      std::size_t workers);
 
 // Functions for the registry's row; memory is per voice, in bytes.
-double predicted_ns(const Program& program, const Shards& form, const Workload& load);
+double operations(const Program& program, const Shards& form, const Workload& load);
 std::string description(const Program& program, const Shards& form);
 std::uint64_t voice_bytes(const Program& program, const Shards& form, std::uint64_t number_bytes);
 

@@ -371,7 +371,7 @@ std::optional<Shards> share_out(const Program& program, const Workload& load,
                                 const Progress& progress) {
   Executor* const executor = executor_of(load);
   const std::size_t workers = executor->size();
-  const double whole_ns = predicted_ns(program, load);
+  const double whole_ns = estimated_ns(program, load);
   const std::vector<Attempt> attempts = attempts_at(program, load, whole_ns);
   if (!is_plain(program) || !program.waveguides.empty() || attempts.empty()) {
     return std::nullopt;
@@ -405,7 +405,7 @@ std::optional<Shards> share_out(const Program& program, const Workload& load,
     if (!found) {
       continue;
     }
-    if (const double ns = predicted_ns(program, *found, load); ns < best_ns) {
+    if (const double ns = nominal_ns * operations(program, *found, load); ns < best_ns) {
       best_ns = ns;
       best = std::move(found);
       if (attempt.is_in_cache) {

@@ -500,28 +500,20 @@ std::optional<Grid> grid_form(const Program& program, const Progress& progress) 
   return best;
 }
 
-Work work(const Program& program, const Grid& form, const Workload& load) {
-  const double voices = load.voices;
+// Counts per voice: five operations a pack of slots and one for each offset, or seven for every
+// link law; links that fit into no row are stepped number by number.
+double operations(const Program& program, const Grid& form, const Workload& load) {
   const double lanes = static_cast<double>(whole_pack_bytes(load.isa)) / bytes_of_number(load);
-  Work work;
-  work.add(Item::grid_sample, voices)
-      .add(Item::grid_rest, voices * static_cast<double>(form.rest_ends.size() + form.ports.size()))
-      .add(Item::grid_place, voices * static_cast<double>(program.taps.size()))
-      .add(Item::grid_passive, voices * passive_ns(program));
+  double count = 60.0 + 8.0 * static_cast<double>(form.rest_ends.size() + form.ports.size()) +
+                 150.0 * static_cast<double>(program.taps.size()) + passive_operations(program);
   for (const GridSegment& segment : form.segments) {
-    const double packs = voices * segment.count / lanes;
-    work.add(Item::grid_segment, voices)
-        .add(Item::grid_pack, packs)
-        .add(Item::grid_offset, packs * static_cast<double>(segment.offsets.size()));
+    count += 12.0 + segment.count / lanes * (5.0 + static_cast<double>(segment.offsets.size()));
   }
   for (const GridLinks& links : form.links) {
-    const bool is_spring = is_linear(program.link_runs[links.run].law);
-    work.add(is_spring ? Item::grid_spring : Item::grid_link,
-             voices * form.count / lanes * static_cast<double>(links.offsets.size()));
+    count += 7.0 * form.count / lanes * static_cast<double>(links.offsets.size());
   }
   const double bytes = 3.0 * bytes_of_number(load) * form.count;
-  return work.add(Item::grid_line, voices * lines_of(bytes))
-      .add(Item::grid_far_line, voices * far_lines_of(bytes));
+  return load.voices * (count + 0.5 * lines_of(bytes) + 5.0 * far_lines_of(bytes));
 }
 
 std::string description(const Program&, const Grid& form) {

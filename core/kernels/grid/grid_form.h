@@ -81,7 +81,7 @@ inline constexpr std::uint32_t least_grid_masses = 16;
 std::optional<Grid> grid_form(const Program& program, const Progress& progress = {});
 
 // Functions for the registry's row; memory is per voice, in bytes.
-Work work(const Program& program, const Grid& form, const Workload& load);
+double operations(const Program& program, const Grid& form, const Workload& load);
 std::string description(const Program& program, const Grid& form);
 std::uint64_t voice_bytes(const Program& program, const Grid& form, std::uint64_t number_bytes);
 

@@ -17,27 +17,21 @@ struct Rows {
   double pushed = 0.0;
 };
 
-// Returns the work of free motion, in which a block is one sum.
-Work modal_work(double modes, const Rows& rows, const Workload& load) {
-  constexpr double most_rows = 8.0;  // of one sweep
+// Counts per voice. Modes that no link holds are stepped for a whole block at once. Held ones are
+// swept once a sample, with all their rows.
+double modal_operations(double modes, const Rows& rows, const Workload& load) {
+  constexpr double most_rows = 8.0;  // that are summed in one sweep
+  const double lanes = static_cast<double>(vector_bytes(load.isa)) / bytes_of_number(load);
+  const double packs = modes / lanes;
   const double held = rows.places + rows.pushed;
-  Work work;
-  work.add(Item::modal_moving_sample, load.moving)
-      .add(Item::modal_moving_mode, load.moving * modes)
-      .add(Item::modal_line, lines_of(bytes_of_number(load) * modes * (6.0 + held + rows.heard)));
+  double count = load.moving * (64.0 + 5.0 * packs) +
+                 2.0 * lines_of(bytes_of_number(load) * modes * (6.0 + held + rows.heard)) +
+                 5.0 * rows.heard;
   if (rows.places == 0.0) {
-    return work.add(Item::modal_sample, 1.0)
-        .add(Item::modal_mode, modes)
-        .add(Item::modal_heard, rows.heard)
-        .add(Item::modal_output, modes * rows.heard)
-        .add(Item::modal_push, modes * rows.pushed);
+    return count + 17.0 + packs * (1.0 + 0.5 * rows.heard + 2.0 * rows.pushed);
   }
-  return work.add(Item::modal_held_sample, 1.0)
-      .add(Item::modal_place, rows.places)
-      .add(Item::modal_heard, rows.heard)
-      .add(Item::modal_held_output, modes * rows.heard)
-      .add(held > most_rows ? Item::modal_wide_mode : Item::modal_held_mode, modes)
-      .add(held > most_rows ? Item::modal_wide_row : Item::modal_row, modes * held);
+  count += 85.0 + 15.0 * rows.places + packs * rows.heard;
+  return count + packs * (held > most_rows ? 4.0 * held : 2.5 + 1.5 * held);
 }
 
 double passive_count(const Program& program) {
@@ -48,25 +42,32 @@ double passive_count(const Program& program) {
   return links;
 }
 
-// Returns the work of passive links. They are coupled through the modes and solved together,
-// directly if their laws are linear where they act. Their forces are added to all modes in the next
-// sweep, or for four places at a time. A plectrum acts half of the time, so it counts by half.
-void add_solving(const Program& program, double modes, double places, Work& work) {
-  constexpr double of_a_straight_link = 28.0;
-  constexpr double of_a_link = 110.0;
+// Through the modes each passive link acts on all others. Several are solved together, directly if
+// they are straight where they act. Their forces are added to all modes during the next sweep if it
+// has room, or four places at a time. A pick acts only for a moment, so it counts half.
+double solving_operations(const Program& program, double packs, double places) {
+  constexpr double of_a_straight_link = 110.0;
+  constexpr double of_a_link = 440.0;
   constexpr double rows_of_a_sweep = 8.0;
   const double links = passive_count(program);
   double sum = 0.0;
   for (const LinkRun& run : program.link_runs) {
     const LawFacts& law = facts_of(run.law);
-    const double each = links == 1.0             ? 1.5 * law.solve_ns
+    const double each = links == 1.0             ? 1.5 * law.solve_operations
                         : law.is_straight        ? of_a_straight_link
                         : law.zone == Zone::near ? 0.5 * of_a_link
                                                  : of_a_link;
     sum += run.scheme == Scheme::plain ? 0.0 : run.count * each;
   }
-  const double shoves = links > 0.0 && places > rows_of_a_sweep ? std::ceil(places / 4.0) : 0.0;
-  work.add(Item::modal_passive, sum).add(Item::modal_passive_mode, shoves * modes);
+  const double sweeps = links > 0.0 && places > rows_of_a_sweep ? std::ceil(places / 4.0) : 0.0;
+  return sum + 4.0 * sweeps * packs;
+}
+
+double all_operations(const Program& program, double modes, const Rows& rows, double places,
+                      const Workload& load) {
+  const double lanes = static_cast<double>(vector_bytes(load.isa)) / bytes_of_number(load);
+  return load.voices *
+         (modal_operations(modes, rows, load) + solving_operations(program, modes / lanes, places));
 }
 
 std::size_t force_count(const Modes& form) {
@@ -83,26 +84,21 @@ std::string in_db(double share) {
 
 }  // namespace
 
-Work work(const Program& program, const Modes& form, const Workload& load) {
-  // An output that is a force has two rows, and is computed sample by sample.
+double operations(const Program& program, const Modes& form, const Workload& load) {
+  // A force is heard along two rows of its own, sample by sample, as places are.
   const auto places = static_cast<double>(form.places.size());
   const Rows rows{.places = places + static_cast<double>(2 * force_count(form)),
                   .heard = static_cast<double>(form.outputs.size()),
                   .pushed = static_cast<double>(form.pushes.size())};
-  const double modes = (form.is_crossed ? 2.0 : 1.0) * form.modes;
-  Work work = modal_work(modes, rows, load);
-  add_solving(program, modes, places, work);
-  return load.voices * work;
+  return all_operations(program, (form.is_crossed ? 2.0 : 1.0) * form.modes, rows, places, load);
 }
 
-double least_modal_ns(const Program& program, const Workload& load) {
+double least_modal_operations(const Program& program, const Workload& load) {
   const LinkCount links = links_of(program);
   // Two links at one mass share its place, so each counts as half of one.
   const double places = 0.5 * (links.bent + links.others + passive_count(program));
   const Rows rows{.places = places, .heard = static_cast<double>(program.outputs.size())};
-  Work work = modal_work(program.moving, rows, load);
-  add_solving(program, program.moving, places, work);
-  return load.voices * cost(work, load);
+  return all_operations(program, program.moving, rows, places, load);
 }
 
 std::string description(const Program&, const Modes& form) {

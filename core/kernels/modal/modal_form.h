@@ -163,10 +163,10 @@ std::optional<Modes> modal_form(const Program& program, const model::Budget& bud
                                 const Progress& progress = {}, bool is_untuned = false,
                                 bool is_exact = false);
 
-// Returns a lower bound of the cost, before the form is made.
-double least_modal_ns(const Program& program, const Workload& load);
+// Returns a lower bound of the operations, before the form is made.
+double least_modal_operations(const Program& program, const Workload& load);
 
-Work work(const Program& program, const Modes& form, const Workload& load);
+double operations(const Program& program, const Modes& form, const Workload& load);
 std::string description(const Program& program, const Modes& form);
 std::uint64_t voice_bytes(const Program& program, const Modes& form, std::uint64_t number_bytes);
 

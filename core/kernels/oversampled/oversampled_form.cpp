@@ -22,9 +22,9 @@ Oversampled oversampled_form(Program fine, std::uint32_t times) {
   return {.fine = std::make_shared<const Program>(std::move(fine)), .times = times};
 }
 
-double predicted_ns(const Program& program, const Oversampled& form, const Workload& load) {
+double operations(const Program& program, const Oversampled& form, const Workload& load) {
   const double driven = static_cast<double>(program.inputs.size() + program.outputs.size());
-  return form.times * (predicted_ns(*form.fine, load) + 1.0 + 0.5 * driven * packs_of(load));
+  return form.times * (operations(*form.fine, load) + 4.0 + 2.0 * driven * packs_of(load));
 }
 
 std::string description(const Program&, const Oversampled& form) {

@@ -23,7 +23,7 @@ Program oversampled_program(const Program& program, std::uint32_t times);
 // Makes the tables from such a Program, which keeps its form.
 Oversampled oversampled_form(Program fine, std::uint32_t times);
 
-double predicted_ns(const Program& program, const Oversampled& form, const Workload& load);
+double operations(const Program& program, const Oversampled& form, const Workload& load);
 std::string description(const Program& program, const Oversampled& form);
 std::uint64_t voice_bytes(const Program& program, const Oversampled& form,
                           std::uint64_t number_bytes);

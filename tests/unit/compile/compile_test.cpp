@@ -88,7 +88,7 @@ TEST_CASE("The plan lists the connected components and their forms", "[compile]"
   CHECK(plan.parts[2].links == 0);
   for (const Part& part : plan.parts) {
     CHECK(part.method == Method::direct);
-    CHECK(part.predicted_ns > 0.0);
+    CHECK(part.estimated_ns > 0.0);
   }
   CHECK(describe(plan.parts).find("5 masses, 7 links") != std::string::npos);
   const Machine still = make_machine(network_of("@g ground 0."), 44100.0, true);
@@ -100,7 +100,7 @@ TEST_CASE("The plan chooses the form with the lowest worst-case cost", "[compile
     const Planned plan = make_plan(make_machine(network_of(text), 44100.0, true),
                                    {.isa = Isa::v3, .voices = voices});
     REQUIRE(plan.parts.size() == 1);
-    CHECK(plan.parts[0].predicted_ns > 0.0);
+    CHECK(plan.parts[0].estimated_ns > 0.0);
     INFO(describe(plan.parts));
     // The chosen form is the one that runs.
     CHECK(row_of(plan.machine.parts[0].form).method == plan.parts[0].method);

@@ -84,7 +84,7 @@ TEST_CASE("the facts of every law are complete, and its name is unique", "[laws]
     CHECK(law.has(Role::damping));
     CHECK((law.is_friction) != law.has(Role::stiffness));
     CHECK((law.zone == Zone::everywhere || law.has(Role::reach)));
-    CHECK(law.solve_ns > 0.0);
+    CHECK(law.solve_operations > 0.0);
     CHECK(!law.words[0].word.empty());
   });
 }

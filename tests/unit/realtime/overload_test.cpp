@@ -309,8 +309,8 @@ TEST_CASE("the warning about a plan too large for one core says how many voices 
           "[overload]") {
   const auto plan = [](double share) {
     Plan made;
-    made.parts.push_back({.predicted_ns = 0.25 * share * 1e9 / 48000.0});
-    made.parts.push_back({.predicted_ns = 0.75 * share * 1e9 / 48000.0});
+    made.parts.push_back({.estimated_ns = 0.25 * share * 1e9 / 48000.0});
+    made.parts.push_back({.estimated_ns = 0.75 * share * 1e9 / 48000.0});
     return made;
   };
   CHECK(overload_warning(plan(1.75), 64, 48000.0, Precision::float64) ==
