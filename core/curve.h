@@ -1,4 +1,4 @@
-// core: a curve of straight lines between points, as a preset draws one.
+// core: piecewise linear curves.
 #pragma once
 
 #include <algorithm>
@@ -8,13 +8,13 @@
 
 namespace ressort {
 
-using CurvePoint = std::array<double, 2>;  // where, and how much there
+using CurvePoint = std::array<double, 2>;  // x, y
 
-// Between points whose first numbers ascend; beyond them as much as at the nearest. There is one at
-// least. [any thread] wait-free, O(points)
-inline double value_at(const std::vector<CurvePoint>& points, double where) {
+// Returns the curve's value at x. The points have ascending x, and there is at least one. Outside
+// the points the curve is constant. [any thread] wait-free, O(points)
+inline double value_at(const std::vector<CurvePoint>& points, double x) {
   std::size_t next = 0;
-  while (next < points.size() && points[next][0] < where) {
+  while (next < points.size() && points[next][0] < x) {
     ++next;
   }
   if (next == 0 || next == points.size()) {
@@ -22,10 +22,10 @@ inline double value_at(const std::vector<CurvePoint>& points, double where) {
   }
   const CurvePoint& a = points[next - 1];
   const CurvePoint& b = points[next];
-  return a[1] + (b[1] - a[1]) * (where - a[0]) / (b[0] - a[0]);
+  return a[1] + (b[1] - a[1]) * (x - a[0]) / (b[0] - a[0]);
 }
 
-// Whether a range is so wide that equal turns are equal ratios of it.
+// Returns whether a range is so wide that a knob maps to it by equal ratios.
 constexpr bool is_wide(double minimum, double maximum) {
   return minimum > 0.0 && maximum >= 10.0 * minimum;
 }

@@ -1,5 +1,5 @@
-// core: arithmetic as a flat list of steps for a small stack machine. The model room writes it
-// (expression.h), the engine room runs it; neither has to know the other.
+// core: arithmetic expressions as a list of steps for a small stack machine. The model room
+// compiles them (expression.h), and the engine evaluates them. Neither needs to know the other.
 #pragma once
 
 #include <algorithm>
@@ -39,7 +39,7 @@ struct Step {
 
 using Formula = std::vector<Step>;
 
-// How many numbers a step takes from the stack, before it leaves one there.
+// Returns the number of operands that a step pops. It then pushes one result.
 constexpr std::size_t operands(Op op) {
   switch (op) {
     case Op::number:
@@ -66,13 +66,13 @@ constexpr std::size_t operands(Op op) {
   return 0;
 }
 
-// The deepest stack that a formula as written may need; the reader refuses a deeper one. What is
-// made of several formulas needs some more.
+// Stack limit of a formula in a model; the parser rejects a deeper one. Combinations of several
+// formulas need a little more.
 inline constexpr std::size_t max_formula_depth = 32;
 inline constexpr std::size_t formula_stack = max_formula_depth + 4;
 inline constexpr std::size_t max_formula_steps = 256;
 
-// The formula's value. Wait-free: bounded by its length, which the reader bounds. [any thread]
+// Returns the formula's value. Wait-free, O(steps). [any thread]
 inline double evaluate(std::span<const Step> formula, std::span<const double> parameters) {
   std::array<double, formula_stack> stack{};
   std::size_t top = 0;
@@ -138,7 +138,7 @@ inline double evaluate(std::span<const Step> formula, std::span<const double> pa
   return top == 0 ? 0.0 : stack[0];
 }
 
-// How deep the stack gets.
+// Returns the greatest stack depth.
 inline std::size_t stack_depth(std::span<const Step> formula) {
   std::size_t depth = 0;
   std::size_t most = 0;
@@ -149,13 +149,13 @@ inline std::size_t stack_depth(std::span<const Step> formula) {
   return most;
 }
 
-// How the value depends on the parameters: not at all?
+// Returns whether the value does not depend on parameters.
 inline bool is_constant(std::span<const Step> formula) {
   return std::none_of(formula.begin(), formula.end(),
                       [](const Step& step) { return step.op == Op::parameter; });
 }
 
-// A formula that is a number is written as one.
+// Replaces a constant formula by its value.
 inline Formula folded(Formula formula) {
   return is_constant(formula) ? Formula{{Op::number, 0, evaluate(formula, {})}} : formula;
 }

@@ -1,4 +1,4 @@
-// core: who hangs together with whom, by union-find.
+// core: connected components by union-find.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +13,7 @@ class Groups {
   explicit Groups(std::size_t count) : parent_(count) {
     std::iota(parent_.begin(), parent_.end(), 0u);
   }
-  // Who stands for the whole group.
+  // Returns the representative of the group of i. Halves the path on the way.
   std::uint32_t find(std::uint32_t i) {
     while (parent_[i] != i) {
       i = parent_[i] = parent_[parent_[i]];

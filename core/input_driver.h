@@ -1,5 +1,5 @@
-// core: what drives an input of a voice: turns targets, sweeps, strikes and pushes into a position
-// or a force for every sample. Its callers are the gestures of gesture.h.
+// core: the driver of one input in one voice. It turns targets, sweeps, strikes and pushes into a
+// position or a force for every sample. The gestures of gesture.h call it.
 #pragma once
 
 #include <cmath>
@@ -10,7 +10,7 @@
 
 namespace ressort {
 
-// A position: value and its change per sample. A force: value only.
+// A position with its change per sample, or a force, which has no velocity.
 struct InputSample {
   double value = 0.0;
   double velocity = 0.0;
@@ -19,7 +19,7 @@ struct InputSample {
 // Every method is wait-free. [audio]
 class alignas(64) InputDriver {
  public:
-  // At rest at `position`; for a force, exerting none.
+  // Puts the driver to rest at `position`; a force input starts at 0.
   void place(double position) {
     *this = InputDriver{};
     value_ = target_ = position;
@@ -39,21 +39,21 @@ class alignas(64) InputDriver {
     speed_ = std::fabs(speed);
   }
 
-  // Moves on and on at `speed` units per sample, which is reached as by a one-pole filter.
+  // Moves continuously. The velocity approaches `speed` units per sample by a one-pole filter.
   void draw(double speed, double pole) {
     motion_ = Motion::draw;
     speed_ = speed;
     pole_ = pole;
   }
 
-  // What is drawn moves on so many times as fast, as the voice's pitch does.
+  // Multiplies the speed of a draw, to follow a change of the voice's pitch.
   void hasten(double ratio) {
     if (motion_ == Motion::draw) {
       speed_ *= ratio;
     }
   }
 
-  // A force or a displacement on top of whatever else goes on: one sample, or a raised cosine over
+  // Adds a pulse of force or displacement to the current motion: one sample, or a raised cosine of
   // `frames` samples with the same sum.
   void strike(double force, double frames = 1.0) {
     const RaisedCosine pulse(frames);
@@ -66,7 +66,7 @@ class alignas(64) InputDriver {
     }
   }
 
-  // A constant force for `frames` samples.
+  // Adds a constant force for `frames` samples.
   void push(double force, std::size_t frames) {
     held_ = force;
     held_frames_ = frames;
@@ -75,7 +75,7 @@ class alignas(64) InputDriver {
   bool is_moving() const {
     return motion_ != Motion::rest || is_struck() || bump_ != 0.0 || held_frames_ > 0;
   }
-  bool is_drawn() const { return motion_ == Motion::draw; }  // on and on
+  bool is_drawn() const { return motion_ == Motion::draw; }
   double value() const { return value_; }
   double target() const { return target_; }
 
@@ -88,7 +88,7 @@ class alignas(64) InputDriver {
     return sample;
   }
 
-  // The next positions, `step` apart in memory: next_position() again and again.
+  // Writes the next positions, `step` apart in memory, as repeated calls of next_position() would.
   template <class T>
   void fill_positions(std::size_t frames, std::size_t step, T* value, T* velocity) {
     for (std::size_t n = 0; n < frames;) {
@@ -153,8 +153,8 @@ class alignas(64) InputDriver {
           velocity_ = 0.0;
           motion_ = Motion::rest;
         }
-        // The velocity is given as it is, not as a difference of positions that may have
-        // travelled far.
+        // The velocity is returned directly. The difference of two positions would lose precision
+        // once the bow has travelled far.
         value_ += velocity_;
         return {value_, velocity_};
     }
@@ -163,7 +163,7 @@ class alignas(64) InputDriver {
 
   double arrival() const { return 1e-12 * (1.0 + std::fabs(target_)); }
 
-  // As long as it is on its way; returns the first sample that is not filled.
+  // Writes the approach to a target. Returns the index of the first sample not written.
   template <class T>
   std::size_t fill_approach(std::size_t n, std::size_t frames, std::size_t step, T* value,
                             T* velocity) {
@@ -193,10 +193,10 @@ class alignas(64) InputDriver {
     }
   }
 
-  // What is asked of each driver in each block lies side by side.
+  // The fields that every block reads share a cache line.
   double value_ = 0.0;
   double pulse_ = 0.0;
-  double bump_ = 0.0;  // of a position, in this sample
+  double bump_ = 0.0;  // displacement by a pulse in this sample
   std::size_t blow_left_ = 0;
   std::size_t held_frames_ = 0;
   Motion motion_ = Motion::rest;
@@ -204,7 +204,7 @@ class alignas(64) InputDriver {
   double target_ = 0.0;
   double speed_ = 0.0;
   double pole_ = 0.0;
-  double blow_ = 0.0;  // the sum of a pulse
+  double blow_ = 0.0;  // sum of the current pulse
   RaisedCosine blow_pulse_;
   double held_ = 0.0;
 };

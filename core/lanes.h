@@ -1,6 +1,6 @@
-// core: the one SIMD type, and memory for it. Kernels are written once over Pack<T, Bytes>
-// and compiled for each instruction set (see isa.h). What is `static` here has a copy in every
-// such unit: code for a wide machine can never be linked into what runs on a narrow one.
+// core: the SIMD type and aligned memory. Kernels are written once over Pack<T, Bytes> and compiled
+// for each instruction set (see isa.h). The functions here are `static`, so each of these units has
+// its own copy: code for a wide machine is never linked into code that runs on a narrow one.
 #pragma once
 
 #include <cmath>
@@ -22,11 +22,11 @@ struct PackOf<double, Bytes> {
   typedef double Type __attribute__((vector_size(Bytes), may_alias));
 };
 
-// Bytes / sizeof(T) numbers that are worked on together.
+// A vector of Bytes / sizeof(T) numbers.
 template <class T, std::size_t Bytes>
 using Pack = typename PackOf<T, Bytes>::Type;
 
-// What a pack is made of; a plain number is its own.
+// The element type of a pack. A plain number is its own element.
 template <class V>
 struct ScalarOf {
   using Type = decltype(V{}[0] + V{}[0]);
@@ -42,7 +42,7 @@ struct ScalarOf<double> {
 template <class V>
 using Scalar = typename ScalarOf<V>::Type;
 
-// From and to wherever it is: packs need not be aligned.
+// Unaligned load and store.
 template <class V>
 static inline V load(const Scalar<V>* from) {
   V pack;
@@ -55,7 +55,7 @@ static inline void store(Scalar<V>* to, V pack) {
   __builtin_memcpy(to, &pack, sizeof pack);
 }
 
-// a where the mask holds, b elsewhere, lane by lane.
+// Returns a in the lanes where the mask is set, b elsewhere.
 template <class V, class Mask>
 static inline V select(Mask mask, V a, V b) {
   return mask ? a : b;
@@ -66,13 +66,13 @@ static inline V absolute(V x) {
   return select(x < V{}, -x, x);
 }
 
-// 0 of what is below it.
+// Returns max(x, 0).
 template <class V>
 static inline V positive(V x) {
   return select(x > V{}, x, V{});
 }
 
-// -1, 0 or 1.
+// Returns -1, 0 or 1.
 template <class V>
 static inline V sign(V x) {
   const V one = V{} + 1;
@@ -91,7 +91,7 @@ static inline V exponential(V x) {
   }
 }
 
-// x^y of an x that is not below 0; 0^0 is 1.
+// Returns x^y for x >= 0; 0^0 is 1.
 template <class V>
 static inline V power(V x, V y) {
   if constexpr (sizeof(V) == sizeof(Scalar<V>)) {
@@ -116,7 +116,7 @@ static inline V square_root(V x) {
   }
 }
 
-// The numbers of a pack in one, half by half: nothing waits for one number after the other.
+// Reduces a pack to one number by a binary tree over halves, which avoids a serial dependency.
 template <class V, class Both>
 [[gnu::always_inline]] static inline auto folded(V pack, Both both) {
   using Number = Scalar<V>;
@@ -134,7 +134,7 @@ template <class V, class Both>
   }
 }
 
-// Whether a mask, as comparisons give it, holds in any lane.
+// Returns whether a mask (the result of a comparison) is set in any lane.
 template <class Mask>
 static inline bool any_of(Mask mask) {
   if constexpr (std::is_integral_v<Mask>) {
@@ -149,7 +149,7 @@ static inline bool any_of(Mask mask) {
 
 inline constexpr std::size_t widest_bytes = 64;  // of any pack
 
-// Begins on a cache line, so that every pack in it is aligned.
+// Allocates on cache lines, so that every pack is aligned.
 template <class T>
 struct LineAllocator {
   using value_type = T;

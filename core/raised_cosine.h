@@ -1,6 +1,6 @@
-// core: the pulse of a blow, a raised cosine over so many samples, whole or not. Samples are taken
-// in their middles, and those that come in as it grows do so from 0: a harder touch, or a higher
-// key, is brighter by no step. The pulse of 1.5 samples or less is one sample.
+// core: the pulse of a blow, a raised cosine of any length in samples. It is sampled at the middle
+// of each sample. A sample that appears as the pulse grows starts at 0, so timbre changes
+// continuously with strength and key. A pulse of 1.5 samples or less is one sample.
 #pragma once
 
 #include <cmath>
@@ -21,14 +21,14 @@ struct RaisedCosine {
     turn = 2.0 * std::numbers::pi / frames;
     sum = samples - std::sin(turn * samples) / (2.0 * std::sin(0.5 * turn));
   }
-  // Its n-th sample, n < count: all of them together are 1.
+  // Returns the n-th sample, n < count. The sum of all samples is 1.
   double at(std::size_t n) const {
     return (1.0 - std::cos(turn * (static_cast<double>(n) + 0.5))) / sum;
   }
 
   std::size_t count = 1;
-  double turn = 2.0 * std::numbers::pi;  // from sample to sample
-  double sum = 2.0;                      // of 1 - cos
+  double turn = 2.0 * std::numbers::pi;  // phase increment per sample
+  double sum = 2.0;                      // of 1 - cos over all samples
 };
 
 }  // namespace ressort

@@ -1,4 +1,4 @@
-// core: how every fallible function answers. Core throws nothing through its doors.
+// core: the result of a function that can fail. Core throws no exceptions across its interface.
 #pragma once
 
 #include <cassert>
@@ -8,15 +8,14 @@
 
 namespace ressort {
 
-// What went wrong, said to the person whose input it was. `line` and `column` count from 1;
-// 0 means that the place has none.
+// An error message for the user. `line` and `column` count from 1; 0: the error has no position.
 struct Error {
   std::string message;
   int line = 0;
   int column = 0;
 };
 
-// Either a value or an Error. Ask before you take: `if (!r) return r.error();`.
+// Either a value or an Error. Check before access: `if (!r) return r.error();`.
 template <class T>
 class [[nodiscard]] Result {
  public:
@@ -39,7 +38,7 @@ class [[nodiscard]] Result {
   std::variant<T, Error> content_;
 };
 
-// For functions that have nothing to give back but their success.
+// The value of functions that return success only.
 struct Done {};
 
 }  // namespace ressort

@@ -1,7 +1,6 @@
-// core: whose names each room finds without saying where they are. A room is a namespace; what
-// stands beside the rooms is in ressort itself. A room finds the names of those that it may see and
-// of no others: tests/rooms.sh holds this against its table. A directive passes on what the room
-// that it names finds. Every header of a room includes this, or one that does.
+// core: the using directives between rooms. A room is a namespace; files outside the rooms use
+// ressort itself. A room finds the names of exactly the rooms that it may see, which tests/rooms.sh
+// checks. Directives are transitive. Every header of a room includes this file, directly or not.
 #pragma once
 
 namespace ressort {
@@ -26,7 +25,7 @@ namespace solids {
 using namespace linear_algebra;
 }
 
-// The one form that sees linear_algebra says so itself: what stands here, the engine has too.
+// One form sees linear_algebra and has its own directive; a directive here would reach the engine.
 namespace kernels {
 using namespace laws;
 }

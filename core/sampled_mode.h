@@ -1,5 +1,5 @@
-// core: a continuous mode as the published scheme steps it at a rate. Seen by the analysis and by
-// the kernels, which never see each other.
+// core: discretises a continuous mode exactly for the published scheme. Shared by the analysis and
+// the kernels, which do not see each other.
 #pragma once
 
 #include <algorithm>
@@ -7,15 +7,15 @@
 
 namespace ressort {
 
-// w^2 per sample from which on a mode decays the faster (0.456 of the rate), and from which on it
-// rings no more, but gives way as it would at rest.
+// Modes above the first w^2 per sample (0.456 of the rate) decay faster and faster. Modes above the
+// second do not ring; they follow the force quasi-statically.
 inline constexpr double highest_ring = 8.2;
 inline constexpr double nyquist_ring = 9.8;
 
-// x'' + z x' + k x = f / m, all per sample: with r = e^(-z/2) and w^2 = k - z^2/4 the scheme
+// For x'' + z x' + k x = f / m, all per sample, let r = e^(-z/2) and w^2 = k - z^2/4. The scheme
 //   v += (f - K x - Z v) / M,  x += v
-// has the same pole r e^(jw) with M = m, K = m (1 + r^2 - 2 r cos w), Z = m (1 - r^2). What is too
-// high to ring has M = K = Z = k m: it is where f pushes it at the next sample.
+// then has the exact pole r e^(jw) with M = m, K = m (1 + r^2 - 2 r cos w), Z = m (1 - r^2). A mode
+// too high to ring has M = K = Z = k m, which moves it to its static deflection in the next sample.
 struct SampledMode {
   double mass = 0.0;
   double stiffness = 0.0;
@@ -30,7 +30,7 @@ inline SampledMode sampled_mode(double m, double k, double z) {
   const double r = std::exp(-half);
   const double lost = -std::expm1(-half);
   const double sine = std::sin(0.5 * root);
-  // No difference of equals. A mode that creeps has two real poles, each e to one of these sums.
+  // These forms avoid cancellation. An overdamped mode has two real poles, exp(-half +- root).
   const double stiffness = square >= 0.0
                                ? lost * lost + 4.0 * r * sine * sine
                                : std::expm1(-k / (half + root)) * std::expm1(-half - root);

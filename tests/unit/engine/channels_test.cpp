@@ -1,4 +1,4 @@
-// What controllers mean on every channel, whatever the preset: by MIDI 1.0 and General MIDI 2.
+// Standard controllers on every channel, whatever the preset: MIDI 1.0 and General MIDI 2.
 #include "core/engine/midi/channels.h"
 
 #include "tests/support/pitch.h"
@@ -22,7 +22,7 @@ Event turned(int channel, std::uint32_t frame, int number, int value) {
   return on(channel, controller(frame, number, value / 127.0));
 }
 
-// A registered parameter, its data coarse and fine.
+// Sends a registered parameter number with coarse and fine data.
 std::vector<Event> registered(int channel, int parameter, int coarse, int fine) {
   return {turned(channel, 0, 101, 0), turned(channel, 0, 100, parameter),
           turned(channel, 0, 6, coarse), turned(channel, 0, 38, fine)};
@@ -38,7 +38,7 @@ std::vector<double> heard(const std::vector<Event>& events, std::size_t frames =
   return player.y();
 }
 
-// The largest difference.
+// Returns the largest difference.
 double apart(const std::vector<double>& a, const std::vector<double>& b) {
   double most = 0.0;
   for (std::size_t n = 0; n < a.size(); ++n) {
@@ -47,7 +47,7 @@ double apart(const std::vector<double>& a, const std::vector<double>& b) {
   return most;
 }
 
-// How far what the events bend is from where it should be, in cents.
+// Returns the error of the pitch after bend events, in cents.
 double off_by(std::vector<Event> events, double semitones) {
   events.push_back(note_on(0, 69));
   Player bent(scenes::poly_triangle(), struck(1));
@@ -58,8 +58,8 @@ double off_by(std::vector<Event> events, double semitones) {
 
 }  // namespace
 
-TEST_CASE("a bend bends its own channel, as far as the range says", "[channels]") {
-  // Another channel's bend changes nothing.
+TEST_CASE("a bend bends its own channel by the bend range", "[channels]") {
+  // A bend on another channel changes nothing.
   const std::vector<double> plain = heard({note_on(0, 60)});
   CHECK(apart(heard({bend(3, 0, 1.0), note_on(0, 60), bend(3, 5000, -1.0)}), plain) < 1e-12);
   CHECK(apart(heard({note_on(0, 60), bend(0, 5000, .5)}), plain) > .01);
@@ -76,14 +76,14 @@ TEST_CASE("a bend bends its own channel, as far as the range says", "[channels]"
   CHECK(channels.semitones(0) == 12.0);
   enter(0, 1, 50);
   CHECK(channels.semitones(0) == 1.5);
-  channels.turn(0, 96, 1.0);  // a cent more
+  channels.turn(0, 96, 1.0);  // one cent more
   CHECK(channels.semitones(0) == Approx(1.51));
   channels.bend(0, 0.0);
-  enter(1, 96, 0);  // half a semitone up, by 8192
+  enter(1, 96, 0);  // half a semitone up, in 8192 steps
   CHECK(channels.semitones(0) == .5);
   enter(2, 61, 0);
   CHECK(channels.semitones(0) == -2.5);
-  // No parameter is chosen any more: data goes nowhere. Nor does that of others.
+  // No parameter is selected now, so data entry has no effect, here and on other channels.
   channels.turn(0, 101, 1.0);
   channels.turn(0, 100, 1.0);
   channels.turn(0, 6, 1.0);
@@ -94,17 +94,17 @@ TEST_CASE("a bend bends its own channel, as far as the range says", "[channels]"
   CHECK(channels.semitones(1) == 0.0);
 }
 
-TEST_CASE("bend range and tuning are heard", "[channels]") {
+TEST_CASE("bend range and tuning change the pitch", "[channels]") {
   std::vector<Event> far = registered(0, 0, 7, 0);
   far.push_back(bend(0, 0, 1.0));
   CHECK(std::fabs(off_by(far, 7.0)) < 2.0);
   CHECK(std::fabs(off_by(registered(0, 1, 0, 0), -1.0)) < 2.0);
   CHECK(std::fabs(off_by(registered(0, 2, 69, 0), 5.0)) < 2.0);
-  // The measure tells a semitone from two.
+  // The measurement distinguishes a semitone from two.
   CHECK(std::fabs(off_by(registered(0, 2, 69, 0), 4.8)) > 2.0);
 }
 
-TEST_CASE("volume and expression follow 40 dB a decade, without a step", "[channels]") {
+TEST_CASE("volume and expression follow 40 dB a decade and ramp without a step", "[channels]") {
   const std::vector<double> plain = heard({note_on(0, 60)});
   CHECK(heard({turned(0, 0, 7, 100), note_on(0, 60)}) == plain);
   CHECK(apart(heard({turned(2, 0, 7, 0), note_on(0, 60), turned(2, 500, 11, 0)}), plain) < 1e-12);
@@ -115,7 +115,7 @@ TEST_CASE("volume and expression follow 40 dB a decade, without a step", "[chann
     REQUIRE(start != 0.0);
     double worst = 0.0;
     for (std::size_t n = 0; n < found.size(); ++n) {
-      // On a straight line for 20 ms.
+      // The ramp is linear and takes 20 ms.
       const double way = std::clamp((static_cast<double>(n) - 4999.0) / 882.0, 0.0, 1.0);
       const double wanted = plain[n] * (1.0 + way * (gain - 1.0));
       worst = std::max(worst, std::fabs(found[n] - wanted));
@@ -125,11 +125,11 @@ TEST_CASE("volume and expression follow 40 dB a decade, without a step", "[chann
   }
 }
 
-// A damper of 10 ms takes 120 dB in 882 samples, and 221 to come on; then a voice ends with its
-// block of 64.
+// A damper of 10 ms takes 120 dB in 882 samples, plus 221 samples to engage. The voice ends with
+// its block of 64 samples.
 constexpr double damped_after = 882 + 221 + 32;
-TEST_CASE("a pan balances left and right at equal power, without a step", "[channels]") {
-  // Both outputs hear the same mass; the third is heard on the left.
+TEST_CASE("pan balances left and right at equal power and ramps without a step", "[channels]") {
+  // Both outputs read the same mass. Output 3 is on the left.
   const std::string stereo = ringing_string() + scenes::output(2, "s_m6") +
                              scenes::output(3, "s_m6") + scenes::output(4, "s_m6");
   const auto outputs = [&](const std::string& text, const std::vector<Event>& events) {
@@ -140,7 +140,7 @@ TEST_CASE("a pan balances left and right at equal power, without a step", "[chan
   };
   const auto plain = outputs(stereo, {note_on(0, 60)});
   CHECK(outputs(stereo, {turned(0, 0, 10, 64), note_on(0, 60)}) == plain);
-  // General MIDI 2: 1 is hard left, 127 hard right, by cos and sin of a quarter turn.
+  // General MIDI 2: 1 is hard left, 127 hard right, with cosine and sine of a quarter turn.
   const double eighth = std::sin(0.125 * std::numbers::pi);
   const double other = std::cos(0.125 * std::numbers::pi);
   const double root = std::numbers::sqrt2;
@@ -166,7 +166,7 @@ TEST_CASE("a pan balances left and right at equal power, without a step", "[chan
     CHECK(worst < 1e-12);
     CHECK(left * left + right * right == Approx(2.0));
   }
-  // Of its own channel's notes, new ones too; one output alone stays as it is.
+  // Pan applies to the notes of its channel, new ones included. A single output is not changed.
   CHECK(outputs(stereo, {turned(1, 0, 10, 0), note_on(0, 60)}) == plain);
   const auto right = outputs(stereo, {turned(0, 0, 10, 127), note_on(0, 60)});
   CHECK(peak(right[0]) == 0.0);
@@ -175,7 +175,7 @@ TEST_CASE("a pan balances left and right at equal power, without a step", "[chan
         outputs(ringing_string(), {note_on(0, 60)})[0]);
 }
 
-TEST_CASE("the sostenuto pedal holds what was down when it went down", "[channels]") {
+TEST_CASE("the sostenuto pedal holds the keys that were down when it was pressed", "[channels]") {
   const auto ends = [](const std::vector<Event>& events) {
     const std::vector<double> y = heard(events, 20000, .01);
     std::size_t last = 0;
@@ -187,24 +187,24 @@ TEST_CASE("the sostenuto pedal holds what was down when it went down", "[channel
   const int pedal = 66;
   CHECK(ends({note_on(0, 60), turned(0, 1000, pedal, 127), note_off(2000, 60),
               turned(0, 9000, pedal, 0)}) == Approx(9000 + damped_after).margin(33));
-  // Not what came later, nor another channel's.
+  // Later keys, and keys of another channel, are not held.
   CHECK(ends({turned(0, 0, pedal, 127), note_on(100, 60), note_off(2000, 60)}) ==
         Approx(2000 + damped_after).margin(33));
   CHECK(ends({note_on(0, 60), turned(5, 1000, pedal, 127), note_off(2000, 60)}) ==
         Approx(2000 + damped_after).margin(33));
-  // Both pedals: the last that goes up lets go.
+  // If both pedals hold a note, the last pedal that is lifted releases it.
   CHECK(ends({note_on(0, 60), turned(0, 1000, pedal, 127), turned(0, 1500, 64, 127),
               note_off(2000, 60), turned(0, 5000, pedal, 0), turned(0, 8000, 64, 0)}) ==
         Approx(8000 + damped_after).margin(33));
   CHECK(ends({note_on(0, 60), turned(0, 1000, pedal, 127), turned(0, 1500, 64, 127),
               note_off(2000, 60), turned(0, 5000, 64, 0), turned(0, 8000, pedal, 0)}) ==
         Approx(8000 + damped_after).margin(33));
-  // A key that is still down stays.
+  // A key that is still down keeps its note.
   CHECK(ends({note_on(0, 60), turned(0, 1000, pedal, 127), turned(0, 5000, pedal, 0),
               note_off(7000, 60)}) == Approx(7000 + damped_after).margin(33));
 }
 
-TEST_CASE("channel modes end and reset their own channel, by the standard", "[channels]") {
+TEST_CASE("channel modes end and reset their own channel as the standard says", "[channels]") {
   const auto other = on(1, note_on(0, 64));
   const std::vector<double> alone = heard({other});
   const auto equal_from = [&](const std::vector<double>& y, std::size_t from) {
@@ -212,10 +212,10 @@ TEST_CASE("channel modes end and reset their own channel, by the standard", "[ch
                       alone.begin() + static_cast<std::ptrdiff_t>(from),
                       [](double a, double b) { return std::fabs(a - b) < 1e-12; });
   };
-  // 120: at once, whatever the pedal.
+  // Mode 120 ends notes at once, whatever the pedal.
   CHECK(equal_from(heard({note_on(0, 60), other, turned(0, 500, 64, 127), turned(0, 3000, 120, 0)}),
                    3000 + 221));
-  // 123 lets keys go, as fingers would: the pedal still holds.
+  // Mode 123 releases keys as fingers would, so the pedal still holds them.
   CHECK(equal_from(heard({note_on(0, 60), other, turned(0, 3000, 123, 0)}, 20000, .01), 4168));
   CHECK(!equal_from(
       heard({note_on(0, 60), other, turned(0, 500, 64, 127), turned(0, 3000, 123, 0)}, 20000, .01),
@@ -224,7 +224,7 @@ TEST_CASE("channel modes end and reset their own channel, by the standard", "[ch
                           turned(0, 6000, 64, 0)},
                          20000, .01),
                    7168));
-  // 121: bend, expression and pedals; not the volume.
+  // Mode 121 resets bend, expression and pedals, but not the volume.
   CHECK(equal_from(heard({note_on(0, 60), other, turned(0, 500, 64, 127), note_off(1000, 60),
                           turned(0, 3000, 121, 0)},
                          20000, .01),
@@ -239,14 +239,14 @@ TEST_CASE("channel modes end and reset their own channel, by the standard", "[ch
   channels.bend(0, 1.0);
   CHECK(channels.glide_s(0, 0.0) == 4.0);
   channels.reset(0);
-  CHECK(channels.balance(0)[0] == Approx(0.0).margin(1e-12));  // RP-015: nor the pan
+  CHECK(channels.balance(0)[0] == Approx(0.0).margin(1e-12));  // RP-015 keeps the pan too
   CHECK(channels.softness(0) == 1.0);
   CHECK(channels.glide_s(0, 0.0) == 0.0);
   CHECK(channels.level(0) == Approx(.25));
   CHECK(channels.semitones(0) == 0.0);
 }
 
-TEST_CASE("RPN 5 says how far the modulation wheel goes", "[channels]") {
+TEST_CASE("RPN 5 sets the depth of the modulation wheel", "[channels]") {
   // The wheel tightens the string.
   const std::string text = scenes::string("s", 10, "0.1", "0.0005") + "@in1 frcInput @s_m2\n" +
                            scenes::output(1, "s_m6");
@@ -272,14 +272,15 @@ TEST_CASE("RPN 5 says how far the modulation wheel goes", "[channels]") {
   const std::vector<double> full = played({wheel(1.0)});
   REQUIRE(apart(down, half) > 1e-3);
   REQUIRE(apart(half, full) > 1e-3);
-  // General MIDI 2: 128ths of a semitone, of which there are 64 at first.
+  // General MIDI 2: the unit is 1/128 semitone, and the default is 64.
   CHECK(played(registered(0, 5, 0, 64), {wheel(0.5)}) == half);
   CHECK(played(registered(0, 5, 0, 32), {wheel(1.0)}) == half);
   CHECK(played(registered(0, 5, 1, 0), {wheel(0.5)}) == full);
-  CHECK(played(registered(0, 5, 1, 0), {wheel(1.0)}) == full);  // it goes no further than that
+  CHECK(played(registered(0, 5, 1, 0), {wheel(1.0)}) == full);  // the depth is clamped
   CHECK(played(registered(0, 5, 0, 0), {wheel(1.0)}) == down);
-  CHECK(played(registered(3, 5, 0, 0), {wheel(1.0)}) == full);  // another channel's
-  // Of a wheel that is up already, too; and a reset puts the wheel back, but not its depth.
+  CHECK(played(registered(3, 5, 0, 0), {wheel(1.0)}) == full);  // set on another channel
+  // The depth also applies to a wheel that is already up. A reset moves the wheel, but keeps its
+  // depth.
   CHECK(played({wheel(1.0)}, registered(0, 5, 0, 32)) == half);
   CHECK(played({wheel(1.0)}, {turned(0, 0, 121, 0)}) == down);
   std::vector<Event> reset = registered(0, 5, 0, 32);
@@ -287,7 +288,7 @@ TEST_CASE("RPN 5 says how far the modulation wheel goes", "[channels]") {
   CHECK(played(reset, {wheel(1.0)}) == half);
 }
 
-TEST_CASE("the soft pedal softens what is struck while it is down", "[channels]") {
+TEST_CASE("the soft pedal softens notes that are struck while it is down", "[channels]") {
   const std::vector<double> plain = heard({note_on(0, 60)});
   const std::vector<double> soft = heard({turned(0, 0, 67, 127), note_on(0, 60)});
   CHECK(peak(soft) == Approx(.75 * peak(plain)).epsilon(1e-9));

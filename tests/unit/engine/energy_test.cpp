@@ -1,4 +1,4 @@
-// The energy that the scheme conserves: every step's books balance.
+// The energy that the scheme conserves balances in every step.
 #include "core/engine/energy.h"
 
 #include "core/compile/plan.h"
@@ -10,7 +10,7 @@ namespace {
 
 using support::show;
 
-// A kernel whose energy can be asked for, and what each step should have done to it.
+// A kernel with readable energy, and the energy that each step should have.
 template <class T>
 class Books {
  public:
@@ -26,11 +26,11 @@ class Books {
     return energy_of(bare.program(), LaneValues<T>{bare_values(), width()}, x.data(), v.data());
   }
 
-  // One step; afterwards `expected` is the energy that there was, what came and what went.
+  // Runs one step. Afterwards `expected` is the old energy plus the work done in the step.
   void step() {
     const double booked = expected;
     const Program& program = bare.program();
-    const std::vector<double> c = c_;  // before what was turned since the last step
+    const std::vector<double> c = c_;  // before changes since the last step
     const std::vector<double> x0 = x;
     const std::vector<double> v0 = v;
     const std::vector<double> felt = link_forces(c);
@@ -65,7 +65,9 @@ class Books {
     }
     for (std::uint32_t node = program.moving; node < x.size(); ++node) {
       const bool is_point = !program.taps.empty() && node >= program.taps[0].node;
-      expected -= is_point ? 0.0 : felt[node] * mean(node);  // what a hand has to hold against
+      expected -=
+          is_point ? 0.0
+                   : felt[node] * mean(node);  // work of a driven position against the forces on it
     }
     passed += std::fabs(expected - booked);
     scale = std::max(scale, energy().scale);
@@ -75,8 +77,8 @@ class Books {
   std::vector<double> inputs;
   std::vector<double> x, v;
   double expected = 0.0;
-  double scale = 0.0;   // the most that there was
-  double passed = 0.0;  // what came and went in all steps
+  double scale = 0.0;   // greatest energy
+  double passed = 0.0;  // sum of the work in all steps
 
  private:
   std::size_t width() const { return width_; }
@@ -116,8 +118,8 @@ class Books {
   std::vector<double> c_;  // [coefficient] in the last step
 };
 
-// The largest share of the energy that a second of pushing, moving and turning leaves unexplained.
-// In float it is the sum of ever so many roundings, a share of all that went through.
+// Returns the largest unexplained share of the energy in a second of pushing, moving and parameter
+// changes. In float it accumulates many roundings, each a share of the work done.
 template <class T>
 double unexplained(const std::string& text, Method method, std::uint64_t seed) {
   const Network network = support::network_of(text);
@@ -136,9 +138,9 @@ double unexplained(const std::string& text, Method method, std::uint64_t seed) {
     books.step();
     books.expected = books.energy().value;
     for (std::size_t n = 0; n < 44100; ++n) {
-      if (n % 4410 == 0) {  // a jump or a ramp, of everything at once
+      if (n % 4410 == 0) {  // a jump or a ramp of all parameters at once
         std::vector<double> turned = program.parameters;
-        for (std::size_t i = 0; i < turned.size(); ++i) {  // but for a place, which would slide
+        for (std::size_t i = 0; i < turned.size(); ++i) {  // except a place, which would slide
           turned[i] *= network.parameters[i].name == "u" ? 1.0 : random.uniform(0.8, 1.2);
         }
         books.bare.set_coefficients(0, turned, random.uniform(0.9, 1.1), n % 8820 == 0);
@@ -157,7 +159,7 @@ double unexplained(const std::string& text, Method method, std::uint64_t seed) {
 
 }  // namespace
 
-TEST_CASE("Every step's energy is what came less what the dampers took", "[energy]") {
+TEST_CASE("Energy changes by the work done less the loss in dampers in every step", "[energy]") {
   const std::string hit = "@in1 frcInput @m_m1\n" + scenes::output(1, "m_m2");
   CHECK(unexplained<double>(scenes::triangle("0.1", "0.001") + hit, Method::direct, 1) < 1e-12);
   CHECK(unexplained<float>(scenes::triangle("0.1", "0.001") + hit, Method::direct, 1) < 1e-6);
@@ -170,7 +172,7 @@ TEST_CASE("Every step's energy is what came less what the dampers took", "[energ
   }
 }
 
-TEST_CASE("Of networks that nobody wrote too", "[energy]") {
+TEST_CASE("Energy balances in random networks", "[energy]") {
   int seen = 0;
   for (std::uint64_t seed = 1; seen < 24; ++seed) {
     const support::RandomNetwork network = support::random_network(seed);
@@ -188,13 +190,9 @@ TEST_CASE("Of networks that nobody wrote too", "[energy]") {
   }
 }
 
-// --- who makes energy of nothing ----------------------------------------------------------------
+// --- stability -----------------------------------------------------------------------------------
 
-namespace {}  // namespace
-
-// --- who has lost stability ---------------------------------------------------------------------
-
-TEST_CASE("What starts beyond all bounds is silent at every note, never a number that is none",
+TEST_CASE("A model that starts out of bounds is silent at every note and never outputs NaN",
           "[energy]") {
   const std::string text =
       "@g ground 5.\n@m mass 2. 0.5 0.5\n@n mass 1. 1e300 -0.25\n@a spring @g @m 1020.\n"
@@ -212,8 +210,9 @@ TEST_CASE("What starts beyond all bounds is silent at every note, never a number
   }
 }
 
-TEST_CASE("A voice that runs away fades from where it was, and nobody else notices", "[energy]") {
-  // A cubic spring, which holds what is struck gently and throws what is struck hard.
+TEST_CASE("An unstable voice fades from its last sane sample without affecting other voices",
+          "[energy]") {
+  // The cubic spring is stable for a soft blow and unstable for a hard one.
   const std::string text =
       "@g ground 0.\n@m osc 1. 0.05 0.0001 0. 0.\n@c nlSpring3 @m @g 0. 1. 0.\n"
       "@in1 frcInput @m\n@out1 posOutput @m\n";
@@ -230,11 +229,11 @@ TEST_CASE("A voice that runs away fades from where it was, and nobody else notic
     both.run(20000, {support::note_on(0, 60, 0.005), support::note_on(strike, 55, 1.0)});
     CHECK(calm.engine().meters().resets == 0);
     CHECK(both.engine().meters().resets == 1);
-    std::size_t last = 0;  // frame on which the lost one is heard
+    std::size_t last = 0;  // frame at which the unstable voice was last heard
     double steepest = 0.0;
     double before = 0.0;
     double most = 0.0;
-    std::size_t lost = 0;  // where it is the loudest
+    std::size_t lost = 0;  // frame at which the unstable voice is loudest
     for (std::size_t n = 0; n < 20000; ++n) {
       const double other = both.y()[n] - calm.y()[n];
       REQUIRE(std::isfinite(other));
@@ -261,7 +260,7 @@ TEST_CASE("A voice that runs away fades from where it was, and nobody else notic
   }
 }
 
-// --- what may rest ------------------------------------------------------------------------------
+// --- freezing -----------------------------------------------------------------------------------
 
 namespace {
 
@@ -286,13 +285,13 @@ Event blow(std::uint32_t frame, int input) {
 
 }  // namespace
 
-TEST_CASE("What sleeps would never have been heard", "[energy]") {
+TEST_CASE("A frozen part would have stayed inaudible", "[energy]") {
   const std::string text = quiet_string("s", 1);
   support::Player player(text, untuned(), {.method = Method::direct});
   support::Bare<double> never(support::program_of(text));
   CHECK(player.engine().meters().saved == 0.0);
   std::size_t slept = 0;
-  double loudest = 0.0;  // of what was slept over
+  double loudest = 0.0;  // peak of the skipped sound
   for (std::size_t n = 0; n < 10 * 44100; n += 64) {
     player.run(64, n == 0 ? std::vector<Event>{blow(0, 1)} : std::vector<Event>{});
     for (std::size_t i = n; i < n + 64; ++i) {
@@ -305,11 +304,11 @@ TEST_CASE("What sleeps would never have been heard", "[energy]") {
   INFO("asleep after " << slept << ", then " << show(loudest));
   CHECK(slept > 0);
   CHECK(loudest < 1e-6);
-  CHECK(loudest > 1e-9);  // it could not have slept much sooner
+  CHECK(loudest > 1e-9);  // so it could not have been frozen much earlier
   CHECK(player.heap_calls == 0);
 }
 
-TEST_CASE("What sleeps wakes on the very sample, part by part", "[energy]") {
+TEST_CASE("A frozen part is unfrozen at the exact sample, part by part", "[energy]") {
   const std::string text = quiet_string("s", 1) + quiet_string("t", 2);
   const CompileOptions options{.method = Method::direct};
   support::Player fresh(text, untuned(), options);
@@ -320,13 +319,13 @@ TEST_CASE("What sleeps wakes on the very sample, part by part", "[energy]") {
     CHECK(player.engine().meters().saved == 1.0);
     constexpr std::uint32_t frame = 1003;
     player.run(frame + 3000, {blow(frame, static_cast<int>(input))});
-    CHECK(player.engine().meters().saved == 0.5);  // the other one sleeps on
+    CHECK(player.engine().meters().saved == 0.5);  // the other part stays frozen
     for (std::size_t n = 0; n < 3000; ++n) {
       REQUIRE(player.out[input - 1][16421 + frame + n] == fresh.out[input - 1][n]);
       REQUIRE(player.out[2 - input][16421 + frame + n] == 0.0);
     }
   }
-  // So does what a parameter is turned for.
+  // A parameter change unfreezes the parts that depend on it.
   support::Player turned(text, untuned(), options);
   turned.run(16384);
   CHECK(turned.engine().meters().saved == 1.0);
@@ -334,7 +333,7 @@ TEST_CASE("What sleeps wakes on the very sample, part by part", "[energy]") {
   CHECK(turned.engine().meters().saved == 0.5);
 }
 
-TEST_CASE("What could still touch something, or drift, is not put to sleep", "[energy]") {
+TEST_CASE("A part that could still touch something or drift is not frozen", "[energy]") {
   const std::string string =
       scenes::string("s", 10, "0.1", "0.01") + "@in1 frcInput @s_m2\n" + scenes::output(1, "s_m6");
   const auto saved = [](const std::string& text) {

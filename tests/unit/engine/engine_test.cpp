@@ -1,5 +1,5 @@
-// The engine as it is played: voices, pitch, parameters, the guard, sleep; through
-// compile_network().
+// The engine as it is played through compile_network(): voices, pitch, parameters, stability guard
+// and sleep.
 #include "core/engine/engine.h"
 
 #include "tests/support/networks/reference_network.h"
@@ -18,7 +18,7 @@ double key_hz(int key) {
   return 440.0 * std::exp2((key - 69) / 12.0);
 }
 
-// What one note alone sounds like.
+// Returns the output of a single note.
 std::vector<double> alone(const std::string& text, const Preset& preset, std::size_t frames,
                           const std::vector<Event>& events) {
   Player player(text, preset);
@@ -28,8 +28,7 @@ std::vector<double> alone(const std::string& text, const Preset& preset, std::si
 
 }  // namespace
 
-TEST_CASE("a parameter that audio gives acts sample by sample, through expressions too",
-          "[engine]") {
+TEST_CASE("an audio parameter acts sample by sample, through expressions too", "[engine]") {
   const std::string text =
       "@k audioParam @in2\n@g ground 0.\n@a mass 1. 0. 0.\n@b mass 1.5 0. 0.\n"
       "@s springDamper @a @g [0.05+0.04*k] 0.001\n@t springDamper @a @b k 0.001\n"
@@ -64,11 +63,10 @@ TEST_CASE("a parameter that audio gives acts sample by sample, through expressio
   CHECK(comparison.relative() < 1e-12);
 }
 
-// --- pitch
-// ----------------------------------------------------------------------------------------
+// --- pitch --------------------------------------------------------------------------------------
 
-TEST_CASE("a key sounds at its frequency within two cents, at any rate", "[engine]") {
-  // The lower the key, the more the ground's damper, which keeps its strength, bends the mode.
+TEST_CASE("a key has its frequency within two cents at any sample rate", "[engine]") {
+  // The lower the key, the more the ground's damper, whose strength is constant, detunes the mode.
   for (const double rate_hz : {44100.0, 48000.0, 96000.0}) {
     for (const int key : {52, 57, 60, 69, 76, 81, 88, 93, 96}) {
       Player player(scenes::poly_triangle(), struck(1), {.rate_hz = rate_hz});
@@ -80,9 +78,10 @@ TEST_CASE("a key sounds at its frequency within two cents, at any rate", "[engin
   }
 }
 
-TEST_CASE("a key out of reach is silent, and the others never an octave down", "[engine]") {
-  // As published the stiffness may grow 11.876 times (see compile_test), less 2 %; f1 grows by its
-  // root.
+TEST_CASE("an unplayable key is silent, and the other keys are never an octave too low",
+          "[engine]") {
+  // The published scheme lets the stiffness grow 11.876 times (see compile_test), less 2 %. The
+  // frequency grows by the square root.
   Player published(scenes::poly_triangle(), struck(1), {.method = Method::direct});
   const double highest_hz = published.compiled.instrument.highest_frequency_hz;
   CHECK(highest_hz == Approx(858.456 * std::sqrt(0.98 * 11.876)).epsilon(0.02));
@@ -103,7 +102,7 @@ TEST_CASE("a key out of reach is silent, and the others never an octave down", "
   }
 }
 
-TEST_CASE("the bend reaches two semitones either way", "[engine]") {
+TEST_CASE("the bend range is two semitones in either direction", "[engine]") {
   for (const double bend : {-1.0, -0.5, 1.0}) {
     Player player(scenes::poly_triangle(), struck(1));
     player.run(8192, {{.kind = EventKind::bend, .value = bend}, note_on(1000, 69)});
@@ -115,12 +114,11 @@ TEST_CASE("the bend reaches two semitones either way", "[engine]") {
   }
 }
 
-// --- voices
-// ---------------------------------------------------------------------------------------
+// --- voices -------------------------------------------------------------------------------------
 
-TEST_CASE("voices add up, and the same key strikes its own voice again", "[engine]") {
+TEST_CASE("voices add up, and a repeated key strikes its own voice again", "[engine]") {
   const std::string text = ringing_string();
-  // As published: exact modes answer a blow in a voice's very first sample by a little more.
+  // Uses the published scheme. Exact modes answer a blow in a voice's first sample slightly more.
   const auto played = [&](int voices, const std::vector<Event>& events) {
     Player player(text, struck(voices), {.method = Method::direct});
     player.run(8000, events);
@@ -138,17 +136,17 @@ TEST_CASE("voices add up, and the same key strikes its own voice again", "[engin
   }
   INFO(show(chord_error.relative()) << " " << show(again_error.relative()));
   CHECK(chord_error.relative() < 1e-12);
-  CHECK(again_error.relative() < 1e-12);  // linear: what rings is kept, not started anew
+  CHECK(again_error.relative() < 1e-12);  // linear, so the ringing voice is kept and not restarted
   CHECK(again.engine().meters().stolen == 0);
   CHECK(chord.engine().meters().stolen == 0);
   CHECK(again.engine().meters().voices == 1);
 }
 
-TEST_CASE("a note too many takes the place of the quietest, without a step", "[engine]") {
+TEST_CASE("an excess note steals the quietest voice without a step", "[engine]") {
   const std::string text = ringing_string();
   const Preset preset = struck(3);
   const std::vector<Event> three = {note_on(0, 60, 1.0), note_on(0, 64, 0.3), note_on(0, 67, 0.9)};
-  constexpr std::size_t stolen_at = 30000;  // by then every voice's level is its own
+  constexpr std::size_t stolen_at = 30000;  // by then all voices have their own levels
   constexpr std::size_t frames = 40000;
   std::vector<Event> events = three;
   events.push_back(note_on(stolen_at, 71, 1.0));
@@ -161,7 +159,7 @@ TEST_CASE("a note too many takes the place of the quietest, without a step", "[e
   const auto third = alone(text, preset, frames, {three[2]});
   const auto late = alone(text, preset, frames, {note_on(stolen_at, 71, 1.0)});
   Comparison error;
-  for (std::size_t n = stolen_at + 300; n < frames; ++n) {  // the fade is 5 ms long
+  for (std::size_t n = stolen_at + 300; n < frames; ++n) {  // the fade takes 5 ms
     error.add(loud[n] + third[n] + late[n], player.y()[n]);
   }
   INFO(show(error.relative()));
@@ -178,7 +176,7 @@ TEST_CASE("a note too many takes the place of the quietest, without a step", "[e
   CHECK(largest_step(from(player.y())) <= bound);
 }
 
-TEST_CASE("far more notes than voices are taken in order", "[engine]") {
+TEST_CASE("far more notes than voices are played in order", "[engine]") {
   Player player(ringing_string(), struck(4));
   std::vector<Event> events;
   for (int i = 0; i < 40; ++i) {
@@ -188,7 +186,7 @@ TEST_CASE("far more notes than voices are taken in order", "[engine]") {
   CHECK(player.engine().meters().voices == 4);
   CHECK(player.engine().meters().stolen == 36);
   CHECK(player.engine().meters().resets == 0);
-  // A hundred at once: the newest sounds, the others gave way.
+  // A hundred keys at once: the newest sounds, and the others are stolen.
   events.clear();
   for (int i = 0; i < 100; ++i) {
     events.push_back(note_on(0, 20 + i));
@@ -200,7 +198,7 @@ TEST_CASE("far more notes than voices are taken in order", "[engine]") {
       std::all_of(player.y().begin(), player.y().end(), [](double y) { return std::isfinite(y); }));
 }
 
-TEST_CASE("a damper takes 60 dB in its time, the pedal holds it", "[engine]") {
+TEST_CASE("a damper takes 60 dB in its T60, and the pedal holds the note", "[engine]") {
   Preset preset = struck(2);
   preset.damper_s = 0.1;  // 4410 frames
   const std::string text = ringing_string();
@@ -211,8 +209,8 @@ TEST_CASE("a damper takes 60 dB in its time, the pedal holds it", "[engine]") {
   pedalled.run(20000, {note_on(0, 60), controller(100, 64, 1.0), note_off(5000, 60),
                        controller(10000, 64, 0.0)});
   for (std::size_t n = 0; n < 20000; ++n) {
-    // A thousandth of it after 4410 samples, once it has come on with a time constant of 5 ms,
-    // which costs it that much time: and at -120 dB it ends.
+    // The note is 60 dB down after 4410 samples, plus the time constant of 5 ms with which the
+    // damper engages. It ends at -120 dB.
     const auto gain = [&](std::size_t from) {
       const double since = static_cast<double>(n) - static_cast<double>(from) + 1.0;
       const double way = 0.005 * 44100.0;
@@ -227,7 +225,7 @@ TEST_CASE("a damper takes 60 dB in its time, the pedal holds it", "[engine]") {
   CHECK(released.engine().meters().voices == 0);
 }
 
-TEST_CASE("panic and all-notes-off end what sounds", "[engine]") {
+TEST_CASE("panic and all-notes-off end the sound", "[engine]") {
   Player player(ringing_string(), struck(4));
   player.run(5000, {note_on(0, 60), note_on(0, 64), {.frame = 2000, .kind = EventKind::panic}});
   const std::span<const double> y(player.y());
@@ -237,14 +235,13 @@ TEST_CASE("panic and all-notes-off end what sounds", "[engine]") {
   preset.damper_s = 0.01;
   Player off(ringing_string(), preset);
   off.run(5000, {note_on(0, 60), note_on(0, 64), controller(2000, 123, 0.0)});
-  // -120 dB of 0.01 s a 60 dB, 5 ms of coming on, and the end of a block.
+  // The time is -120 dB at 10 ms per 60 dB, plus 5 ms to engage, plus the rest of a block.
   CHECK(peak(std::span<const double>(off.y()).subspan(2000 + 882 + 221 + 64)) == 0.0);
 }
 
-// --- parameters
-// -----------------------------------------------------------------------------------
+// --- parameters ---------------------------------------------------------------------------------
 
-TEST_CASE("a parameter is ramped over 20 ms, as the oracle with a ramped K", "[engine]") {
+TEST_CASE("a parameter is ramped over 20 ms like a reference with a ramped K", "[engine]") {
   const Network network = network_of(scenes::poly_triangle());
   Preset preset = struck(1);
   preset.keyboard = false;
@@ -263,7 +260,7 @@ TEST_CASE("a parameter is ramped over 20 ms, as the oracle with a ramped K", "[e
   }
   INFO(show(error.relative()));
   CHECK(error.relative() < 1e-12);
-  // What changed is told once.
+  // Each change is reported once.
   const auto changes = player.engine().take_changes();
   REQUIRE(changes.size() == 1);
   CHECK(changes[0] == 0);
@@ -271,7 +268,7 @@ TEST_CASE("a parameter is ramped over 20 ms, as the oracle with a ramped K", "[e
   CHECK(player.engine().take_changes().empty());
 }
 
-TEST_CASE("a parameter turned while others ramp, and in a sleeping voice, ends where told",
+TEST_CASE("a parameter changed during a ramp, or while a voice sleeps, reaches its value",
           "[engine]") {
   const std::string text =
       scenes::string("s", 10, "0.1", "0.02") + "@in1 frcInput @s_m2\n" + scenes::output(1, "s_m6");
@@ -288,7 +285,7 @@ TEST_CASE("a parameter turned while others ramp, and in a sleeping voice, ends w
   const std::vector<Event> notes = {note_on(0, 60), note_on(0, 67), note_on(0, 72)};
   turned.run(5000, notes);
   set.run(5000, notes);
-  // The notes sound in other voices here and there, which are added up in another order.
+  // The notes may play in other lanes, whose sums are rounded in another order.
   Comparison error;
   for (std::size_t n = 0; n < set.y().size(); ++n) {
     error.add(set.y()[n], turned.y()[n]);
@@ -297,10 +294,9 @@ TEST_CASE("a parameter turned while others ramp, and in a sleeping voice, ends w
   CHECK(error.relative() < 1e-15);
 }
 
-// --- the guard
-// ------------------------------------------------------------------------------------
+// --- stability guard ----------------------------------------------------------------------------
 
-TEST_CASE("an unstable model fades out and is counted; the output stays finite", "[engine]") {
+TEST_CASE("an unstable model fades out and is counted, and the output stays finite", "[engine]") {
   for (const std::string stiffness : {"1.6", "5", "1e30", "1e300"}) {
     for (const Precision precision : {Precision::float32, Precision::float64}) {
       Preset preset = struck(2);
@@ -319,11 +315,11 @@ TEST_CASE("an unstable model fades out and is counted; the output stays finite",
   }
 }
 
-TEST_CASE("one voice that runs away leaves the others alone", "[engine]") {
+TEST_CASE("an unstable voice leaves the other voices alone", "[engine]") {
   const std::string text = ringing_string();
   Player calm(text, struck(2));
   calm.run(20000, {note_on(0, 60)});
-  // The second voice is hit with more than it may reach.
+  // The second voice is struck beyond its bounds.
   Player player(text, struck(2));
   player.run(20000, {note_on(0, 60),
                      note_on(1000, 67, 0.0),
@@ -341,10 +337,9 @@ TEST_CASE("one voice that runs away leaves the others alone", "[engine]") {
   CHECK(error.relative() < 1e-12);
 }
 
-// --- exactness
-// ------------------------------------------------------------------------------------
+// --- exactness ----------------------------------------------------------------------------------
 
-TEST_CASE("a bare engine is the kernel, bit for bit", "[engine]") {
+TEST_CASE("a bare engine equals its kernel bit for bit", "[engine]") {
   for (const scenes::Example& example : scenes::nine_instruments()) {
     if (example.moving > 200) {
       continue;
@@ -380,9 +375,9 @@ TEST_CASE("a bare engine is the kernel, bit for bit", "[engine]") {
   }
 }
 
-TEST_CASE("how the time is cut into blocks makes no difference to a single bit", "[engine]") {
-  // In the direct form; others round differently where a block ends.
-  // One rings on, so that voices are stolen; one is soon asleep, and woken again.
+TEST_CASE("the block size does not change a single bit", "[engine]") {
+  // Uses the direct form. Other forms round differently at block ends.
+  // One model rings on, so that voices are stolen. The other soon sleeps and is woken again.
   for (const std::string damping : {"0.0005", "0.05"}) {
     const std::string text = scenes::string("s", 10, "0.1", damping) + "@in1 frcInput @s_m2\n" +
                              scenes::output(1, "s_m6");
@@ -431,27 +426,26 @@ TEST_CASE("how the time is cut into blocks makes no difference to a single bit",
   }
 }
 
-// --- sleep and the heap
-// ---------------------------------------------------------------------------
+// --- sleep and allocation -----------------------------------------------------------------------
 
-TEST_CASE("a voice that has come to rest sleeps, and wakes with the next note", "[engine]") {
+TEST_CASE("a voice at rest sleeps and wakes with the next note", "[engine]") {
   Player player(scenes::poly_triangle(), struck(2), {.method = Method::direct});
   player.run(2 * 44100, {note_on(0, 69), note_off(100, 69)});
   CHECK(player.engine().meters().voices == 0);
-  // Silence to the last bit: nothing is stepped any more.
+  // The output is exactly 0, because nothing is stepped.
   CHECK(peak(std::span<const double>(player.y()).subspan(88200 - 4410)) == 0.0);
   const std::vector<double> first(player.y().begin(), player.y().begin() + 8000);
   player.out[0].clear();
   player.run(8000, {note_on(0, 69)});
   CHECK(player.y() == first);
 
-  // Not while its key is down, nor before it is quiet for half a second.
+  // A voice does not sleep while its key is down, nor before half a second of silence.
   Player held(scenes::poly_triangle(), struck(2));
   held.run(2 * 44100, {note_on(0, 69)});
   CHECK(held.y().back() != 0.0);
 }
 
-TEST_CASE("process() never calls the heap", "[engine]") {
+TEST_CASE("process() never allocates memory", "[engine]") {
   Preset preset = struck(2);
   preset.damper_s = 0.02;
   preset.noise = true;
@@ -483,7 +477,7 @@ TEST_CASE("process() never calls the heap", "[engine]") {
     CHECK(player.engine().meters().stolen > 0);
     CHECK(player.heap_calls == 0);
   }
-  const HeapWatch watch;  // and the watch does see the heap
+  const HeapWatch watch;  // the watch does detect allocations
   const auto seen = std::make_unique<int>(1);
   CHECK((watch.calls() >= 1) == heap_is_counted);
 }

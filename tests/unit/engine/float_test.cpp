@@ -12,8 +12,8 @@ using support::network_of;
 using support::program_of;
 using support::show;
 
-// A mass beside a ground at `offset`, `reach` away from it, on a spring and damper that a float
-// holds exactly: how fast it moves is then not a matter of precision.
+// A mass at distance `reach` from a ground at `offset`. Its spring and damper are exact in float,
+// so the precision of the coefficients plays no role.
 struct Swing {
   double hertz = 440.0;
   double offset = 0.0;
@@ -23,7 +23,7 @@ struct Swing {
 
   Swing(double hertz_in, double offset_in, double reach_in)
       : hertz(hertz_in), offset(offset_in), reach(reach_in) {
-    const double r = std::pow(10.0, -3.0 / (3.0 * 44100.0));  // 60 dB in 3 s
+    const double r = std::pow(10.0, -3.0 / (3.0 * 44100.0));  // T60 of 3 s
     damping = static_cast<float>(1.0 - r * r);
     stiffness = static_cast<float>(1.0 + r * r -
                                    2.0 * r * std::cos(2.0 * std::numbers::pi * hertz / 44100.0));
@@ -37,7 +37,7 @@ struct Swing {
     return program;
   }
 
-  // How near to the same in the widest arithmetic the elongation is, over a second.
+  // Returns the accuracy of the elongation over a second, compared with the widest arithmetic.
   template <class T>
   double nearness_db(const Program& formed, Isa isa) const {
     Bare<T> bare(formed, 1, isa);
@@ -63,7 +63,7 @@ struct Swing {
 
 }  // namespace
 
-TEST_CASE("float keeps 100 dB of what moves about 0", "[float]") {
+TEST_CASE("float keeps 100 dB of a motion around 0", "[float]") {
   for (const double hertz : {20.0, 110.0, 440.0, 8000.0}) {
     for (const Isa isa : isas()) {
       const Swing swing(hertz, 0.0, 1.0);
@@ -74,9 +74,9 @@ TEST_CASE("float keeps 100 dB of what moves about 0", "[float]") {
   }
 }
 
-// d'Alembert: a string at K = M that never decays passes its waves on from mass to mass, there and
-// back in 2 (N + 1) samples.
-TEST_CASE("an undamped string at K = M comes back to the last bit", "[float]") {
+// d'Alembert: an undamped string at K = M passes its waves on from mass to mass. They return after
+// 2 (N + 1) samples.
+TEST_CASE("an undamped string at K = M repeats to the last bit", "[float]") {
   for (const Isa isa : isas()) {
     INFO(isa_name(isa));
     Program program = program_of(scenes::string("s", 50, "1.", "0.") + scenes::output(1, "s_m9"));
@@ -101,9 +101,9 @@ TEST_CASE("an undamped string at K = M comes back to the last bit", "[float]") {
   }
 }
 
-// A force that is flushed pulls no longer: what is left swings at the edge of what there is, for
-// ever, 680 dB below 1; but no number that would take longer to compute.
-TEST_CASE("what has decayed is no denormal where these are flushed", "[float]") {
+// Denormal forces are flushed to 0, so the mass keeps swinging at the smallest normal numbers, 680
+// dB below 1. No denormal number slows down the computation.
+TEST_CASE("a decayed signal contains no denormals if these are flushed", "[float]") {
   Program program = program_of("@m osc 1. 0.1 0.001 0. 0.\n" + scenes::output(1, "m"));
   program.position[0] = 1.0;
   const auto left_after = [&](std::size_t frames) {

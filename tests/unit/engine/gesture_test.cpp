@@ -1,4 +1,4 @@
-// Hands: what moves an input, by the closed forms of each gesture; alone and through the engine.
+// Gestures: the motion of an input by closed forms, of the driver alone and in the engine.
 #include "core/gesture.h"
 
 #include "tests/support/networks/reference_network.h"
@@ -11,7 +11,7 @@ using namespace support;
 
 constexpr double smoothing_pole = 0.999;  // 1 - 44.1/44100
 
-// Output 1 is the hand itself, output 2 the mass that it pulls.
+// Output 1 is the driven input, output 2 the mass that it pulls.
 const std::string puppet =
     "@in1 posInput 0.5\n@m mass 1. 0. 0.\n@g ground 0.\n@k param 0.01\n"
     "@l springDamper @in1 @m k 0.01\n@r springDamper @m @g 0.01 0.01\n"
@@ -26,7 +26,7 @@ Preset played(const ControlSetting& control) {
 
 }  // namespace
 
-TEST_CASE("a hand that follows is a one-pole filter, and rests when it is there", "[gesture]") {
+TEST_CASE("following a target is a one-pole filter that comes to rest at the target", "[gesture]") {
   InputDriver driver;
   driver.place(2.0);
   CHECK_FALSE(driver.is_moving());
@@ -48,7 +48,7 @@ TEST_CASE("a hand that follows is a one-pole filter, and rests when it is there"
   CHECK(driver.next_position().value == -1.0);
 }
 
-TEST_CASE("a sweep has one speed and ends exactly where told", "[gesture]") {
+TEST_CASE("a sweep has a constant speed and ends exactly at its target", "[gesture]") {
   InputDriver driver;
   driver.place(1.0);
   driver.sweep(-1.0, 0.0625);
@@ -60,10 +60,10 @@ TEST_CASE("a sweep has one speed and ends exactly where told", "[gesture]") {
   CHECK_FALSE(driver.is_moving());
   driver.sweep(-0.9, 0.0625);
   driver.next_position();
-  CHECK(driver.next_position().value == -0.9);  // the last stride is shorter
+  CHECK(driver.next_position().value == -0.9);  // the last step is shorter
 }
 
-TEST_CASE("a drawn bow nears its speed and keeps it clean however far it goes", "[gesture]") {
+TEST_CASE("a drawn bow approaches its speed and keeps it exact at any distance", "[gesture]") {
   InputDriver driver;
   driver.place(0.0);
   driver.draw(0.001, 0.99);
@@ -74,7 +74,7 @@ TEST_CASE("a drawn bow nears its speed and keeps it clean however far it goes", 
     position += sample.velocity;
     CHECK(sample.value == position);
   }
-  driver.place(1e9);  // where a difference of positions would be worth 7 digits less
+  driver.place(1e9);  // a difference of positions would lose 7 digits here
   driver.draw(0.001, 0.0);
   CHECK(driver.next_position().velocity == 0.001);
   driver.draw(0.0, 0.5);
@@ -84,7 +84,7 @@ TEST_CASE("a drawn bow nears its speed and keeps it clean however far it goes", 
   CHECK_FALSE(driver.is_moving());
 }
 
-TEST_CASE("forces add up: a push, strikes and what is held", "[gesture]") {
+TEST_CASE("pushes, strikes and held forces add up", "[gesture]") {
   InputDriver driver;
   driver.place(0.0);
   driver.push(0.5, 3);
@@ -97,7 +97,7 @@ TEST_CASE("forces add up: a push, strikes and what is held", "[gesture]") {
   CHECK_FALSE(driver.is_moving());
 }
 
-TEST_CASE("a pulse grows longer without a step, and its sum stays", "[gesture]") {
+TEST_CASE("a pulse grows longer without a step and keeps its sum", "[gesture]") {
   const auto pulse = [](double frames) {
     InputDriver driver;
     driver.place(0.0);
@@ -118,7 +118,8 @@ TEST_CASE("a pulse grows longer without a step, and its sum stays", "[gesture]")
     CHECK(std::accumulate(force.begin(), force.end(), 0.0) == Approx(3.0).epsilon(1e-12));
     for (std::size_t n = 0; n < force.size(); ++n) {
       CHECK(force[n] >= 0.0);
-      // Steepest between one sample and two, where 1 of the 3 goes over within half a frame.
+      // The slope is steepest between one sample and two, where a third of the pulse moves within
+      // half a frame.
       CHECK(std::fabs(force[n] - before[n]) < 0.08);
       if (i % 100 == 0) {
         const double whole =
@@ -131,7 +132,7 @@ TEST_CASE("a pulse grows longer without a step, and its sum stays", "[gesture]")
   }
 }
 
-TEST_CASE("a position event moves the hand, smoothed as published", "[gesture]") {
+TEST_CASE("a position event moves the input, smoothed as published", "[gesture]") {
   Player player(puppet, played({.target = "in1"}));
   player.run(3000, {{.frame = 101,
                      .kind = EventKind::gesture,
@@ -143,7 +144,7 @@ TEST_CASE("a position event moves the hand, smoothed as published", "[gesture]")
     const double expected = 1.0 - 0.5 * std::pow(smoothing_pole, after);
     REQUIRE(std::fabs(player.out[0][n] - expected) < 1e-12);
   }
-  // Another input's number, and a force on a position input, do nothing.
+  // An event for another input, or a force on a position input, has no effect.
   Player deaf(puppet, played({.target = "in1"}));
   deaf.run(1000,
            {{.kind = EventKind::gesture, .gesture = Gesture::position, .index = 2, .value = 1.0},
@@ -151,7 +152,7 @@ TEST_CASE("a position event moves the hand, smoothed as published", "[gesture]")
   CHECK(std::all_of(deaf.out[0].begin(), deaf.out[0].end(), [](double x) { return x == 0.5; }));
 }
 
-TEST_CASE("a note holds the hand at the far end of its range until it is released", "[gesture]") {
+TEST_CASE("a note holds the input at the end of its range until it is released", "[gesture]") {
   Player player(puppet,
                 played({.target = "in1", .gesture = Gesture::hold, .low = 0.25, .high = 2.0}));
   player.run(60000, {note_on(1000, 60), note_off(31000, 60)});
@@ -163,7 +164,7 @@ TEST_CASE("a note holds the hand at the far end of its range until it is release
   CHECK(std::fabs(player.out[0][59999] - 0.25) < 1e-11);
 }
 
-TEST_CASE("a pluck sweeps to the other side, the harder the faster", "[gesture]") {
+TEST_CASE("a pluck sweeps to the other side, faster when harder", "[gesture]") {
   const auto control = ControlSetting{
       .target = "in1", .gesture = Gesture::pluck, .low = 0.001, .high = 0.003, .travel = 0.25};
   Player player(puppet, played(control));
@@ -177,13 +178,13 @@ TEST_CASE("a pluck sweeps to the other side, the harder the faster", "[gesture]"
     const double expected = std::max(0.25, 0.75 - 0.003 * static_cast<double>(n - 999));
     REQUIRE(std::fabs(player.out[0][n] - expected) < 1e-13);
   }
-  // The same displacement a second at another rate.
+  // The speed per second is the same at another rate.
   Player fast(puppet, played(control), {.rate_hz = 88200.0});
   fast.run(1000, {note_on(0, 60, 0.5)});
   CHECK(std::fabs(fast.out[0][99] - (0.25 + 0.001 * 100)) < 1e-13);
 }
 
-TEST_CASE("a bowed note draws until the key is released", "[gesture]") {
+TEST_CASE("a bowed note draws until its key is released", "[gesture]") {
   Player player(puppet,
                 played({.target = "in1", .gesture = Gesture::bow, .low = 0.0, .high = 1e-4}));
   player.run(20000, {note_on(0, 60, 0.5), note_off(10000, 60)});
@@ -196,10 +197,9 @@ TEST_CASE("a bowed note draws until the key is released", "[gesture]") {
   CHECK(player.out[0][19999] == player.out[0][19998]);
 }
 
-TEST_CASE("a bow that is bent or glides keeps its speed in units of the string's motion",
-          "[gesture]") {
-  // Slow against the rate: a key's frequency is proportional to sqrt(K) but for w^2 / 24, which is
-  // 3e-4 at the highest.
+TEST_CASE("a bent or gliding bow keeps its speed in units of the string's motion", "[gesture]") {
+  // The motion is slow against the rate: a key's frequency is proportional to sqrt(K), except for
+  // w^2 / 24, which is at most 3e-4.
   const std::string slow =
       "@in1 posInput 0.\n@m mass 1. 0. 0.\n@g ground 0.\n@r springDamper @m @g 0.0001 0.\n"
       "@b nlBow @in1 @m 0.01 0.001\n@out1 posOutput @in1\n";
@@ -212,7 +212,7 @@ TEST_CASE("a bow that is bent or glides keeps its speed in units of the string's
   preset.mono = preset.legato = true;
   Player player(slow, preset);
   const double written_hz = player.compiled.instrument.mode->frequency_hz;
-  // Of the key that is down, whatever else was said, as soon as the 5 ms of its smoothing are over.
+  // The speed follows the held key, whatever events came before, after the 5 ms of smoothing.
   const auto speed = [&](const std::vector<Event>& events) {
     player.run(10000, events);
     return player.y().back() - player.y()[player.y().size() - 2];
@@ -225,7 +225,7 @@ TEST_CASE("a bow that is bent or glides keeps its speed in units of the string's
   CHECK(speed({note_off(0, 72)}) == Approx(at_60 * std::exp2(2.0 / 12.0)).epsilon(4e-4));
 }
 
-TEST_CASE("controllers, pressure and OSC names move what the preset says, by its curve",
+TEST_CASE("controllers, pressure and OSC names drive their targets by the preset's curve",
           "[gesture]") {
   Preset preset = played({.source = ControlSource::controller,
                           .number = 20,
@@ -260,12 +260,12 @@ TEST_CASE("controllers, pressure and OSC names move what the preset says, by its
   CHECK(player.out[0].back() == Approx(-0.75).epsilon(1e-11));
 }
 
-TEST_CASE("a force lasts as long as told, and means the same at every rate", "[gesture]") {
-  // A free mass: a force F over N samples leaves it with the speed F N, in units a sample.
+TEST_CASE("a force lasts for its duration and has the same effect at every rate", "[gesture]") {
+  // A free mass: a force F over N samples gives it the speed F N per sample.
   const std::string free_mass = "@m mass 2. 0. 0.\n@in1 frcInput @m\n@out1 posOutput @m\n";
   const auto at_one_second = [&](double rate_hz, double force, double seconds) {
     Preset preset = played({.target = "in1", .gesture = Gesture::impulse});
-    preset.gain = 1e-5;  // so that nobody takes it for a voice that is lost
+    preset.gain = 1e-5;  // keeps the mass within the bounds of a stable voice
     Player player(free_mass, preset, {.rate_hz = rate_hz});
     player.run(static_cast<std::size_t>(rate_hz), {{.kind = EventKind::gesture,
                                                     .gesture = Gesture::force,
@@ -282,7 +282,7 @@ TEST_CASE("a force lasts as long as told, and means the same at every rate", "[g
   CHECK(at_one_second(88200.0, 0.5, 0.01) == Approx(held).epsilon(1e-4));
 }
 
-TEST_CASE("a blow on a position is one sample beside it, with the velocity of both steps",
+TEST_CASE("a blow on a position is a displacement of one sample, with the velocity of both steps",
           "[gesture]") {
   InputDriver driver;
   driver.place(0.5);
@@ -298,7 +298,7 @@ TEST_CASE("a blow on a position is one sample beside it, with the velocity of bo
   CHECK_FALSE(driver.is_moving());
 }
 
-TEST_CASE("audio moves the hand from where it is; in the bare network it is the hand",
+TEST_CASE("audio is added to the input's position; in the bare network it replaces it",
           "[gesture]") {
   Preset preset = played(
       {.source = ControlSource::audio, .number = 2, .target = "in1", .low = 0.0, .high = 0.5});
@@ -319,7 +319,7 @@ TEST_CASE("audio moves the hand from where it is; in the bare network it is the 
   for (std::size_t n = 0; n < audio.size(); ++n) {
     REQUIRE(player.out[0][n] == 0.5 + 0.5 * audio[n]);
     REQUIRE(bare.out[0][n] == 0.5 * audio[n]);
-    // Its velocity is felt by the mass that it pulls.
+    // The pulled mass reacts to the velocity of the input.
     const double from_rest[] = {0.5 + 0.5 * audio[n]};
     const double as_it_is[] = {0.5 * audio[n]};
     error.add(moved.simulator.step(from_rest)[1], player.out[1][n]);
@@ -328,16 +328,17 @@ TEST_CASE("audio moves the hand from where it is; in the bare network it is the 
   INFO(show(error.relative()));
   CHECK(error.relative() < 1e-12);
   CHECK(player.compiled.instrument.audio_inputs == 2);
-  // Where the channel is not connected the hand is at its place.
+  // An unconnected channel leaves the input at its position.
   Player quiet(puppet, preset);
   const double* const nothing[] = {nullptr, nullptr};
   quiet.run(100, {}, {50}, nothing);
   CHECK(quiet.out[0][99] == 0.5);
 }
 
-TEST_CASE("audio moves the hands of one voice of many as it moves those of one alone",
+TEST_CASE("audio drives the inputs of one voice of many like those of a single voice",
           "[gesture]") {
-  // Two forces and a hand: all moved by sound, or not the last of them; at rest, or on its way.
+  // Two force inputs and a position input. Audio drives all of them or all but the last; the driver
+  // rests or moves.
   const std::string text = scenes::triangle("0.1", "0.001") +
                            "@in1 frcInput @m_m1\n@in2 frcInput @m_m2\n@in3 posInput 0.3\n"
                            "@h springDamper @in3 @m_m0 0.01 0.001\n" +
@@ -380,7 +381,7 @@ TEST_CASE("audio moves the hands of one voice of many as it moves those of one a
   }
 }
 
-TEST_CASE("controls of a round robin take turns from note to note", "[gesture]") {
+TEST_CASE("controls of a round robin alternate from note to note", "[gesture]") {
   const std::string two = ringing_string() + "@in2 frcInput @s_m4\n";
   const auto strike = [](const char* input, double force, int turn, int turns) {
     return ControlSetting{.target = input,
@@ -403,21 +404,22 @@ TEST_CASE("controls of a round robin take turns from note to note", "[gesture]")
   };
   const ControlSetting down = strike("in1", 0.1, 1, 2);
   const ControlSetting up = strike("in2", -0.1, 2, 2);
-  // One instrument: what four notes in turn do is the sum of what each hand does by itself.
+  // Fixed tuning has one instrument: four alternating notes are the sum of the single
+  // ones.
   const std::vector<double> both = heard({down, up}, 4);
   const std::vector<double> first = heard({down}, 4);
   const std::vector<double> second = heard({up}, 4);
   for (std::size_t n = 0; n < both.size(); ++n) {
     REQUIRE(std::fabs(both[n] - first[n] - second[n]) < 1e-12);
   }
-  CHECK(peak(std::span(second).first(1000)) == 0.0);  // it was the other's turn
+  CHECK(peak(std::span(second).first(1000)) == 0.0);  // the other control's turn
   CHECK(peak(std::span(second).subspan(1000, 500)) > 0.0);
-  // The same stroke in turn is the stroke without turns.
+  // A stroke in a round robin equals the stroke without one.
   CHECK(heard({strike("in1", 0.1, 1, 2), strike("in1", 0.1, 2, 2)}, 4) ==
         heard({strike("in1", 0.1, 1, 1)}, 4));
 }
 
-TEST_CASE("noise is shaped by the outputs, and the same in every run", "[gesture]") {
+TEST_CASE("the outputs modulate noise that is the same in every run", "[gesture]") {
   Preset preset = played({.target = "in1"});
   Player plain(puppet, preset);
   preset.noise = true;
@@ -435,7 +437,7 @@ TEST_CASE("noise is shaped by the outputs, and the same in every run", "[gesture
     mean += white / 20000;
     power += white * white / 20000;
   }
-  CHECK(std::fabs(mean) < 0.02);                // 5 standard deviations of a uniform mean
+  CHECK(std::fabs(mean) < 0.02);  // 5 standard deviations of the mean of a uniform distribution
   CHECK(std::fabs(power - 1.0 / 3.0) < 0.011);  // and of its square
 }
 

@@ -1,5 +1,5 @@
-// A million MIDI messages at random, of every kind and channel: then all keys and pedals go up, and
-// nothing sounds.
+// A million random MIDI messages of every kind and channel. Then all keys and pedals are lifted,
+// and nothing sounds.
 #include "app/realtime/midi.h"
 #include "tests/support/player.h"
 
@@ -9,8 +9,8 @@ namespace {
 using namespace support;
 using Bytes = std::vector<std::uint8_t>;
 
-// Messages that are played much, in running status where they can be; each with data at random.
-// Half of them crowd on a few channels and keys, so that they meet.
+// Generates MIDI messages with random data, in running status where possible. Half of them use few
+// channels and keys, so that they interact.
 class Storm {
  public:
   explicit Storm(std::uint64_t seed) : random_(seed) {}
@@ -69,7 +69,7 @@ class Storm {
 
 namespace {
 
-// As a player would: keys first, then pedals.
+// Lifts everything as a player would: keys first, then pedals.
 void end_all(Player& player) {
   std::vector<Event> end;
   for (std::uint8_t channel = 0; channel < 16; ++channel) {
@@ -86,7 +86,7 @@ void end_all(Player& player) {
 
 }  // namespace
 
-TEST_CASE("a million messages leave no note that is stuck", "[midi_storm]") {
+TEST_CASE("a million messages leave no hanging note", "[midi_storm]") {
   for (const bool mono : {false, true}) {
     Preset preset = struck(6);
     preset.damper_s = 0.01;
@@ -128,7 +128,7 @@ TEST_CASE("a million messages leave no note that is stuck", "[midi_storm]") {
                           [](double y) { return std::isfinite(y); }));
       if (++rounds % 5 == 0) {
         end_all(player);
-        // What a controller has woken sleeps again.
+        // A voice that a controller has woken sleeps again.
         for (int i = 0; i < 10 && player.engine().meters().stepped > 0; ++i) {
           player.run(10'000);
         }
@@ -139,7 +139,7 @@ TEST_CASE("a million messages leave no note that is stuck", "[midi_storm]") {
     CHECK(notes > 10'000);
     CHECK(rounds > 200);
     CHECK(player.heap_calls == 0);
-    // And it plays as before.
+    // The engine plays as before.
     player.run(2000, {{.kind = EventKind::controller, .index = 121},
                       {.kind = EventKind::controller, .index = 7, .value = 1.0},
                       note_on(1, 60)});

@@ -1,4 +1,4 @@
-// Waveguides as an instrument: keys, bends, damping, many voices, in single precision as well.
+// Waveguides as an instrument: keys, bends, damping, many voices, also in single precision.
 #include "core/analysis/stability.h"
 #include "core/compile/schemes.h"
 #include "core/model/language/expression.h"
@@ -32,7 +32,7 @@ TEST_CASE("keys set the pitch of a waveguide", "[play_waveguides]") {
   }
 }
 
-TEST_CASE("a waveguide's note is damped, sleeps, and sounds the same again", "[play_waveguides]") {
+TEST_CASE("a waveguide's note is damped, sleeps, and repeats exactly", "[play_waveguides]") {
   Preset preset = struck(1);
   preset.damper_s = 0.2;
   Player player(string, preset);
@@ -61,7 +61,7 @@ TEST_CASE("chords of waveguides are the sum of their notes", "[play_waveguides]"
   }
 }
 
-TEST_CASE("keys leave a model whose waveguides are fixed as it is", "[play_waveguides]") {
+TEST_CASE("keys do not change a model with fixed waveguides", "[play_waveguides]") {
   Preset preset = struck(1);
   preset.fixed = {"s"};
   const auto made = compile_network(network_of(string), preset, {});
@@ -76,7 +76,8 @@ TEST_CASE("keys leave a model whose waveguides are fixed as it is", "[play_waveg
   }
 }
 
-TEST_CASE("springs to a waveguide need no proof, those among masses do", "[play_waveguides]") {
+TEST_CASE("springs to a waveguide need no stability proof, springs among masses do",
+          "[play_waveguides]") {
   const std::string held = string + "@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n@k spring [@s 0.5] @a ";
   CHECK(compile_network(network_of(held + "1000.\n@l spring @a @b 1.9\n"), struck(1), {}));
   const auto made = compile_network(network_of(held + "0.1\n@l spring @a @b 2.1\n"), struck(1), {});

@@ -1,9 +1,8 @@
-// A model sounds the same at every sample rate, but for what the explicit scheme itself bends. All
-// figures are derived: with k and z the lowest mode's stiffness and damping over its mass, and
-// r = 44100 / rate, the scheme steps k r^2 and z r, so that a mode turns by theta a sample and
-// shrinks by rho,
-//   rho^2 = 1 - z r,   cos(theta) = (2 - k r^2 - z r) / (2 rho),
-// and a force of r for one sample makes it ring with the amplitude r / sin(theta).
+// A model sounds the same at every sample rate, except for the deviation of the explicit scheme.
+// All figures are derived. Let k and z be the lowest mode's stiffness and damping over its mass,
+// and r = 44100 / rate. The scheme steps k r^2 and z r, so a mode turns by theta per sample and
+// shrinks by rho with rho^2 = 1 - z r,   cos(theta) = (2 - k r^2 - z r) / (2 rho), and a force of r
+// for one sample makes it ring with the amplitude r / sin(theta).
 #include <complex>
 
 #include "core/model/language/expression.h"
@@ -22,11 +21,11 @@ struct Scene {
   std::string name;
   std::string text;
   double k = 0.0;      // of the lowest mode, over its mass
-  double z = 0.0;      // the same
-  double share = 1.0;  // of the mode's amplitude, from the input to the output
+  double z = 0.0;      // the same for damping
+  double share = 1.0;  // share of the mode's amplitude from the input to the output
 };
 
-// 1000 Hz, and a second until 60 dB are gone, as a continuous oscillator.
+// A continuous oscillator at 1000 Hz with a T60 of one second.
 Scene oscillator() {
   const double z = 2.0 * std::log(1000.0) / reference_hz;
   const double turn = 2.0 * pi * 1000.0 / reference_hz;
@@ -48,8 +47,8 @@ Scene string() {
       0.1 * stretch, 0.02 * stretch, shape(3) * shape(12)};
 }
 
-// Three masses on a ground by half a spring: (1, y, y) stretches by the smaller root of
-// l^2 - 3.5 l + 0.5, and y = (2.5 - l)/2.
+// Three masses on a ground by half a spring: the shape (1, y, y) belongs to the smaller root of
+// l^2 - 3.5 l + 0.5, with y = (2.5 - l)/2.
 Scene triangle() {
   const double stretch = (3.5 - std::sqrt(10.25)) / 2.0;
   const double y = (2.5 - stretch) / 2.0;
@@ -61,7 +60,7 @@ Scene triangle() {
           0.1 * stretch, 0.002 * stretch, y * y / (1.0 + 2.0 * y * y)};
 }
 
-// What an impulse of force 1 leaves at output 1, as a bare model is rendered.
+// Returns output 1 after an impulse of force 1, as a bare model is rendered.
 std::vector<double> struck_once(const Scene& scene, double rate_hz, double seconds,
                                 bool rescale = true) {
   const Preset preset = default_preset(network_of(scene.text), true);
@@ -78,8 +77,8 @@ struct Ring {
   double amplitude = 0.0;  // at the start
 };
 
-// Pitch and decay of the mode near a guess, whatever scheme made it: how far it turns and shrinks
-// between two windows of 0.1 s. The Blackman-Harris window keeps the other modes 92 dB down.
+// Measures pitch and decay of the mode near a guess, from its phase and level in two windows 0.1 s
+// apart. The Blackman-Harris window keeps the other modes 92 dB down.
 Ring measured(std::span<const double> y, double rate_hz, double guess_hz) {
   const auto width = static_cast<std::size_t>(0.1 * rate_hz);
   const auto apart = static_cast<std::size_t>(0.2 * rate_hz);
@@ -116,7 +115,7 @@ Ring by_formula(const Scene& scene, double rate_hz) {
           .amplitude = scene.share * r / std::sin(theta)};
 }
 
-// m x'' + z x' + k x = 0, which the scheme approaches as the rate grows.
+// The solution of m x'' + z x' + k x = 0, which the scheme approaches as the rate grows.
 Ring continuous(const Scene& scene) {
   const double turn = std::sqrt(scene.k - scene.z * scene.z / 4.0);
   return {.hz = reference_hz * turn / (2.0 * pi),
@@ -130,7 +129,8 @@ double cents(double hz, double against_hz) {
 
 }  // namespace
 
-TEST_CASE("pitch, decay and an impulse's amplitude are the scheme's at every rate", "[rate]") {
+TEST_CASE("pitch, decay and impulse amplitude follow the scheme's formulas at every rate",
+          "[rate]") {
   for (const Scene& scene : {oscillator(), string(), triangle()}) {
     for (const double rate_hz : rates_hz) {
       const Ring expected = by_formula(scene, rate_hz);
@@ -146,9 +146,9 @@ TEST_CASE("pitch, decay and an impulse's amplitude are the scheme's at every rat
   }
 }
 
-TEST_CASE("a model differs between rates by no more than the scheme bends it", "[rate]") {
-  // The scheme's formulas to the first order: a mode is sharp by k r^2/24 + z r/4, decays faster
-  // by z r/2, and an impulse rings louder by k r^2/8 - z r/4.
+TEST_CASE("a model differs between rates only by the scheme's deviation", "[rate]") {
+  // First-order formulas of the scheme: a mode is sharp by k r^2/24 + z r/4, decays faster by z
+  // r/2, and an impulse is louder by k r^2/8 - z r/4.
   const double cent = std::log(2.0) / 1200.0;
   for (const Scene& scene : {oscillator(), string(), triangle()}) {
     const Ring limit = continuous(scene);
@@ -167,7 +167,7 @@ TEST_CASE("a model differs between rates by no more than the scheme bends it", "
       CHECK(found.amplitude / limit.amplitude - 1.0 == Approx(louder).margin(2e-5));
     }
   }
-  // The figures that the manual states, of a mode at 1 kHz that rings for a second.
+  // The figures in the manual, for a mode at 1 kHz that rings for a second.
   const Scene scene = oscillator();
   const auto at = [&](double rate_hz) {
     return measured(struck_once(scene, rate_hz, 0.31), rate_hz, 1000.0);
@@ -180,7 +180,7 @@ TEST_CASE("a model differs between rates by no more than the scheme bends it", "
   CHECK(low.amplitude / high.amplitude - 1.0 == Approx(0.0024).margin(1e-4));
 }
 
-TEST_CASE("numbers that are taken raw give the same samples at every rate", "[rate]") {
+TEST_CASE("raw numbers give the same samples at every rate", "[rate]") {
   for (const Scene& scene : {oscillator(), string(), triangle()}) {
     const std::vector<double> expected = struck_once(scene, reference_hz, 0.05);
     for (const double rate_hz : rates_hz) {
