@@ -1,5 +1,5 @@
-// core: where along a waveguide's loop its filters and its places are, in whatever unit of time.
-// Seen by the kernels and by what is written in other languages, which never see each other.
+// core: the positions of filters and connection places in a waveguide's loop, as shares of one
+// round trip. Shared by the kernels and the FAUST export, which do not see each other.
 #pragma once
 
 #include <algorithm>
@@ -8,31 +8,32 @@
 
 namespace ressort {
 
-// Where a waveguide's filters are, as shares of what goes round from the right end, where waves
-// turn to the left; and how much further on the next place is that something holds. What lies
-// between held places is rounded from there, so that a string that gets longer does so without
-// leaps.
+// The position of a waveguide's filters, as a share of the round trip from the right end, where
+// waves turn to the left; and the distance from there to the next place that a spring holds. Delays
+// between held places are rounded from there, so that a string whose length changes does not jump.
 struct FiltersAt {
   double share = 0.0;
   double to_held = 0.0;
+  bool operator==(const FiltersAt&) const = default;
 };
 
-// Which share of the loop a wave has gone through since the filters where it passes the
-// coordinate u, 0 < u < 1, to the left or to the right: above 0, at most 1.
+// Returns the share of the round trip between the filters and the point where a wave passes the
+// coordinate u, 0 < u < 1, to the left or to the right. The result is in (0, 1].
 inline double share_from_filters(const FiltersAt& filters, double u, bool runs_right) {
   const double from_right_end = 0.5 * (1.0 - u);
   const double at = (runs_right ? 1.0 - from_right_end : from_right_end) - filters.share;
   return at > 0.0 ? at : at + 1.0;
 }
 
-// The same to tell the order in which waves pass places: two stay in theirs at every pitch.
+// Returns the same with u clamped inside the ends, as a sort key: the order of two places is the
+// same at every pitch.
 inline double order_from_filters(const FiltersAt& filters, double u, bool runs_right) {
   constexpr double nearly = 1e-9;
   return share_from_filters(filters, u > nearly ? std::min(u, 1.0 - nearly) : nearly, runs_right);
 }
 
-// In the middle of the widest way between places that springs hold, `held` being their
-// coordinates: what lies between two of those is a whole number of samples.
+// Places the filters in the middle of the widest gap between the places that springs hold, whose
+// coordinates are `held`. The delay between two held places is a whole number of samples.
 inline FiltersAt filters_between(const std::vector<double>& held) {
   std::vector<double> ways;  // from the right end
   for (const double u : held) {

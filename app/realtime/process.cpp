@@ -396,7 +396,7 @@ bool Process::is_ringing() const {
 bool Process::continues_current(const PlayingEngine& next) const {
   return next.serial != 0 && next.serial == current_->serial &&
          (next.has_new_numbers ? next.engine->renumber_from(*current_->engine)
-                               : next.engine->go_on_from(*current_->engine));
+                               : next.engine->continue_from(*current_->engine));
 }
 
 void Process::play_models(std::size_t input_count, std::size_t output_count, std::size_t frames) {

@@ -13,8 +13,8 @@
 #include "app/realtime/midi.h"
 #include "app/realtime/motion.h"
 #include "core/engine/engine.h"
-#include "core/engine/mixing/dc_blocker.h"
-#include "core/engine/mixing/limiter.h"
+#include "core/engine/dc_blocker.h"
+#include "core/engine/limiter.h"
 
 namespace ressort::realtime {
 

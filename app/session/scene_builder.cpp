@@ -7,6 +7,7 @@
 #include "app/session/load_progress.h"
 #include "app/session/memory.h"
 #include "app/session/timing.h"
+#include "core/engine/renumbering.h"
 
 namespace ressort::session {
 namespace {

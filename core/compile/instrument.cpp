@@ -26,15 +26,15 @@ Control make_control(const Network& network, const ControlSetting& setting) {
   control.highest_key = static_cast<std::uint8_t>(setting.highest_key);
   control.turn = static_cast<std::uint8_t>(setting.turn - 1);
   control.turns = static_cast<std::uint8_t>(setting.turns);
-  control.low = setting.low;
-  control.high = setting.high;
-  control.exponential = setting.exponential;
-  control.travel = setting.travel;
-  control.has_level = setting.has_level;
-  control.low_db = setting.low_db;
-  control.high_db = setting.high_db;
-  control.longest_s = setting.longest_ms / 1e3;
-  control.shortest_s = setting.shortest_ms / 1e3;
+  control.settings = {.low = setting.low,
+                      .high = setting.high,
+                      .exponential = setting.exponential,
+                      .travel = setting.travel,
+                      .has_level = setting.has_level,
+                      .low_db = setting.low_db,
+                      .high_db = setting.high_db,
+                      .longest_s = setting.longest_ms / 1e3,
+                      .shortest_s = setting.shortest_ms / 1e3};
   control.target = static_cast<std::uint16_t>(control.gesture == Gesture::parameter
                                                   ? find_parameter(network, setting.target)
                                                   : find_input(network, setting.target));
@@ -98,7 +98,7 @@ double find_blow(const Network& network, const std::vector<Control>& controls, d
   double blow = 0.0;
   for (const Control& control : controls) {
     if (control.gesture == Gesture::impulse && network.inputs[control.target].is_force) {
-      blow = std::max({blow, std::fabs(control.low), std::fabs(control.high)});
+      blow = std::max({blow, std::fabs(control.settings.low), std::fabs(control.settings.high)});
     }
   }
   if (blow > 0.0) {

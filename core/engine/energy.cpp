@@ -23,7 +23,7 @@ void add(Energy& energy, double value) {
   energy.scale += std::fabs(value);
 }
 
-// Some of the nodes, or of the links.
+// A range of nodes or links.
 struct Share {
   std::size_t first = 0;
   std::size_t end = 0;
@@ -55,8 +55,8 @@ void add_masses(const MassRun& run, Share share, LaneValues<T> c, const double* 
   });
 }
 
-// One elongation d, that was d - v a sample before.
-void add_straight(double k, double z, double d, double v, Energy& energy) {
+// Adds the energy of a linear spring with elongation d, which was d - v one sample before.
+void add_linear(double k, double z, double d, double v, Energy& energy) {
   add(energy, 0.5 * k * d * (d - v));
   add(energy, -0.25 * z * v * v);
 }
@@ -65,16 +65,17 @@ template <class ForceLaw>
 void add_discrete_gradient(const ForceLaw& law, double d, double v, Energy& energy) {
   const double before = d - v;
   if constexpr (ForceLaw::facts.contains_spring && ForceLaw::facts.is_curved) {
-    add_straight(law.k, law.z, d, v, energy);
+    add_linear(law.k, law.z, d, v, energy);
     add(energy, 0.5 * (law.curved(d) + law.curved(before)));
   } else {
     add(energy, 0.5 * (law.potential(d) + law.potential(before)));
   }
 }
 
-// k is the stiffness of what of the law is straight: the share of its energy that is not in doubt.
+// Adds the energy of a nonlinear law in the plain scheme. k is the stiffness of its linear part,
+// which does not contribute to the uncertainty.
 template <class ForceLaw>
-void add_bent(const ForceLaw& law, double k, double d, double v, Energy& energy) {
+void add_nonlinear(const ForceLaw& law, double k, double d, double v, Energy& energy) {
   constexpr const LawFacts& facts = ForceLaw::facts;
   const double before = d - v;
   const double now = law.force(d, 0.0);
@@ -84,16 +85,17 @@ void add_bent(const ForceLaw& law, double k, double d, double v, Energy& energy)
   const double damped = 0.25 * (law.force(d, v) - now) * v;
   add(energy, 0.5 * (here + there) - 0.25 * change * v);
   add(energy, -damped);
-  // Where two straight pieces meet the energy jumps; where a law is curved it wavers by no more
-  // than a share of what the curve holds. A damper that comes and goes takes its part along.
+  // At the corner of a piecewise linear law the energy jumps. With a curved law it varies by at
+  // most a share of the energy in the curved part. A damper that acts only in contact adds its own
+  // term.
   if constexpr (facts.is_curved) {
-    energy.doubt += 0.5 * std::fabs(here - 0.5 * k * d * d) +
-                    0.5 * std::fabs(there - 0.5 * k * before * before) +
-                    0.25 * std::fabs((change - k * v) * v);
+    energy.uncertainty += 0.5 * std::fabs(here - 0.5 * k * d * d) +
+                          0.5 * std::fabs(there - 0.5 * k * before * before) +
+                          0.25 * std::fabs((change - k * v) * v);
   } else {
-    energy.doubt += std::fabs((now - 0.5 * change) * v - (here - there));
+    energy.uncertainty += std::fabs((now - 0.5 * change) * v - (here - there));
   }
-  energy.doubt += facts.contains_spring ? 0.0 : std::fabs(damped);
+  energy.uncertainty += facts.contains_spring ? 0.0 : std::fabs(damped);
 }
 
 template <class T>
@@ -107,7 +109,7 @@ void add_links(const Program& program, const LinkRun& run, Share share, LaneValu
     });
   };
   if (is_linear(run.law)) {
-    each([&](double d, double speed) { add_straight(c[0], c[1], d, speed, energy); });
+    each([&](double d, double speed) { add_linear(c[0], c[1], d, speed, energy); });
     return;
   }
   with_law<double>(
@@ -119,7 +121,7 @@ void add_links(const Program& program, const LinkRun& run, Share share, LaneValu
           if (run.scheme == Scheme::discrete_gradient) {
             add_discrete_gradient(law, d, speed, energy);
           } else {
-            add_bent(law, k, d, speed, energy);
+            add_nonlinear(law, k, d, speed, energy);
           }
         });
       });
@@ -174,8 +176,8 @@ bool rests_at_zero(const Program& program, LaneValues<T> coefficients, const dou
 }
 
 template <class T>
-double distance_at_rest(const Program& program, LaneValues<T> coefficients, const double* x,
-                        std::uint32_t link) {
+double gap_at_rest(const Program& program, LaneValues<T> coefficients, const double* x,
+                   std::uint32_t link) {
   const auto run = std::find_if(
       program.link_runs.begin(), program.link_runs.end(),
       [&](const LinkRun& candidate) { return link - candidate.first < candidate.count; });
@@ -197,6 +199,6 @@ template void add_energy(const Program&, LaneValues<double>, const double*, cons
                          std::size_t, std::size_t, Energy&);
 template bool rests_at_zero(const Program&, LaneValues<float>, const double*);
 template bool rests_at_zero(const Program&, LaneValues<double>, const double*);
-template double distance_at_rest(const Program&, LaneValues<float>, const double*, std::uint32_t);
-template double distance_at_rest(const Program&, LaneValues<double>, const double*, std::uint32_t);
+template double gap_at_rest(const Program&, LaneValues<float>, const double*, std::uint32_t);
+template double gap_at_rest(const Program&, LaneValues<double>, const double*, std::uint32_t);
 }  // namespace ressort::engine

@@ -1,5 +1,4 @@
-// core/engine: the only thing that crosses from any input to the engine. Small, trivially
-// copyable; a gesture is a list of these.
+// core/engine: events, the only input of the engine besides audio. Small and trivially copyable.
 #pragma once
 
 #include <cstdint>
@@ -10,34 +9,35 @@
 namespace ressort::engine {
 
 enum class EventKind : std::uint8_t {
-  note_on,       // index: key 0..127, value: velocity 0..1 (above 0), may be fractional; value2: Hz
-                 // in place of the key's, 0: the key's
-  note_off,      // index: key, value: how fast it goes up, 0..1
+  note_on,       // index: key 0..127, value: velocity 0..1 (above 0); value2: frequency in Hz in
+                 // place of the key's, 0: the key's
+  note_off,      // index: key, value: release velocity 0..1
   controller,    // index: MIDI controller number, value: 0..1
-  program,       // index: MIDI program number; for whoever loads, no engine takes it
-  pressure,      // of the whole channel, value: 0..1
+  program,       // index: MIDI program number; handled by the loader, ignored by engines
+  pressure,      // of the channel, value: 0..1
   key_pressure,  // index: key, value: 0..1
-  bend,          // value: -1..1 of the bend range
+  bend,          // value: -1..1, times the bend range
   custom,        // index: row of the control map (an OSC address of the preset), value: 0..1
   parameter,     // index: parameter, value: as in the model
-  key_tuning,  // index: key, value: Hz before transposition, 0: silent; value2: 1: what sounds, too
-  tuning_reset,  // every key as the preset has it, what sounds, too
+  key_tuning,    // index: key, value: Hz before transposition, 0: silent; value2: 1 also retunes
+                 // sounding voices
+  tuning_reset,  // restores the preset's tuning, of sounding voices too
   gesture,       // index: input number, value and value2: the gesture's arguments
-  strike,        // value: the force on a mass, for one sample at 44 100 Hz; value2: which mass of
-                 // the network with its macros written out
-  panic,         // everything fades to silence at once
+  strike,        // value: force for one sample at 44 100 Hz; value2: index of the mass in the
+                 // network with expanded macros
+  panic,         // fades all voices to silence
 };
 
-// Of a key that goes up and does not say how fast.
+// Release velocity of a note-off that does not specify one.
 inline constexpr double usual_release_velocity = 0.5;
 
 struct Event {
-  std::uint32_t frame = 0;  // within the block that it is given with
+  std::uint32_t frame = 0;  // within the block
   EventKind kind = EventKind::panic;
-  Gesture gesture = Gesture::position;  // of EventKind::gesture
-  std::uint8_t channel = 0;  // MIDI channel 0..15, or that of a note's ID: note_channel()
+  Gesture gesture = Gesture::position;  // for EventKind::gesture
+  std::uint8_t channel = 0;             // MIDI channel 0..15, or note_channel() of a note's ID
   std::uint16_t index = 0;
-  std::uint32_t model = 0;  // serial of the model that `index` belongs to; 0: any
+  std::uint32_t model = 0;  // serial number of the model that `index` refers to; 0: any
   double value = 0.0;
   double value2 = 0.0;
 };

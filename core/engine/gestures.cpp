@@ -11,7 +11,7 @@ bool has_turn(const Control& control, std::uint64_t stroke) {
   return control.turns < 2 || stroke % control.turns == control.turn;
 }
 
-bool is_asked(const Control& control, Source source, int number) {
+bool matches(const Control& control, Source source, int number) {
   const bool is_in_range = number >= control.lowest_key && number <= control.highest_key;
   return control.source == source && (source == Source::note         ? is_in_range
                                       : source == Source::controller ? number == control.number
@@ -19,51 +19,39 @@ bool is_asked(const Control& control, Source source, int number) {
 }
 
 Stroke stroke_of(const Control& control, double amount = 1.0) {
-  return {.amount = amount,
-          .has_control = true,
-          .low = control.low,
-          .high = control.high,
-          .exponential = control.exponential,
-          .travel = control.travel,
-          .has_level = control.has_level,
-          .low_db = control.low_db,
-          .high_db = control.high_db,
-          .longest_s = control.longest_s,
-          .shortest_s = control.shortest_s};
+  return {.amount = amount, .has_control = true, .settings = control.settings};
 }
 
 }  // namespace
 
-Gestures::Gestures(const Machine& machine, const Playing& playing, Voices& voices,
-                   Parameters& parameters)
+Gestures::Gestures(const Machine& machine, const Playing& playing)
     : machine_(machine),
       playing_(playing),
-      voices_(voices),
-      parameters_(parameters),
-      drivers_(voices.size() * machine.inputs.size()),
-      pitches_(voices.size(), 1.0) {
+      drivers_(lane_count(playing.voices) * machine.inputs.size()),
+      pitches_(lane_count(playing.voices), 1.0) {
   starts_.resize(Channels::count * machine.inputs.size());
   for (std::size_t input = 0; input < machine.inputs.size(); ++input) {
     set_starts(all_channels, input, machine.inputs[input].position);
   }
   for (const Control& control : playing.controls) {
     if (const auto start = row_of(control.gesture).start) {
-      set_starts(all_channels, control.target, start(on_input(control.target, stroke_of(control))));
+      set_starts(all_channels, control.target,
+                 start(stroke_on(control.target, stroke_of(control))));
     }
   }
 }
 
-void Gestures::go_on_from(const Gestures& from) {
+void Gestures::continue_from(const Gestures& from) {
   drivers_ = from.drivers_;
   pitches_ = from.pitches_;
   starts_ = from.starts_;
   strokes_ = from.strokes_;
 }
 
-void Gestures::place(std::size_t lane) {
+void Gestures::reset_drivers(const Voice& voice, std::size_t lane) {
   const std::size_t inputs = machine_.inputs.size();
   for (std::size_t input = 0; input < inputs; ++input) {
-    driver(lane, input).place(starts_[voices_[lane].channel * inputs + input]);
+    driver(lane, input).place(starts_[voice.channel * inputs + input]);
   }
 }
 
@@ -78,32 +66,16 @@ void Gestures::set_starts(ChannelMask channels, std::size_t input, double start)
   }
 }
 
-void Gestures::wake(std::size_t lane, std::uint8_t channel) {
-  if (voices_.wake(lane)) {
-    voices_[lane].channel = channel;
-    place(lane);
+void Gestures::wake(Keyboard& keyboard, std::size_t lane, std::uint8_t channel) {
+  if (keyboard.wake(lane)) {
+    Voice& voice = keyboard.voices[lane];
+    voice.channel = channel;
+    reset_drivers(voice, lane);
   }
 }
 
-bool Gestures::is_moving(std::size_t lane) const {
-  for (std::size_t input = 0; input < machine_.inputs.size(); ++input) {
-    if (is_moving(lane, input)) {
-      return true;
-    }
-  }
-  return false;
-}
-
-bool Gestures::is_drawn(std::size_t lane) const {
-  for (std::size_t input = 0; input < machine_.inputs.size(); ++input) {
-    if (drivers_[lane * machine_.inputs.size() + input].is_drawn()) {
-      return true;
-    }
-  }
-  return false;
-}
-
-Stroke Gestures::on_input(std::size_t input, Stroke stroke) const {
+// Adds the data of the input that a gesture needs.
+Stroke Gestures::stroke_on(std::size_t input, Stroke stroke) const {
   stroke.is_force = machine_.inputs[input].is_force;
   stroke.middle = machine_.inputs[input].position;
   stroke.rate_ratio = machine_.rate_ratio;
@@ -112,90 +84,94 @@ Stroke Gestures::on_input(std::size_t input, Stroke stroke) const {
   return stroke;
 }
 
-void Gestures::play(const GestureRow& gesture, std::size_t input, Stroke stroke,
-                    const Scope& scope) {
-  const std::optional<std::size_t> last = voices_.last_of(scope);
+void Gestures::play(const GestureRow& gesture, std::size_t input, Stroke stroke, const Scope& scope,
+                    Keyboard& keyboard, Parameters& parameters) {
+  const Voices& voices = keyboard.voices;
+  const std::optional<std::size_t> latest = keyboard.latest_of(scope);
   const auto first_channel = static_cast<std::uint8_t>(std::countr_zero(scope.channels));
-  stroke = on_input(input, stroke);
+  stroke = stroke_on(input, stroke);
   if (gesture.goal != nullptr) {
     const double goal = gesture.goal(stroke);
     if (scope.key == Scope::every_key) {
       set_starts(scope.channels, input, goal);
     }
-    for (std::size_t lane = 0; lane < voices_.size(); ++lane) {
-      const bool is_meant = voices_.hears(voices_[lane], scope) || lane == last;
-      if (is_meant && (voices_[lane].awake || !gesture.is_touch)) {
-        wake(lane, first_channel);
+    for (std::size_t lane = 0; lane < voices.size(); ++lane) {
+      const bool is_addressed = keyboard.is_addressed(voices[lane], scope) || lane == latest;
+      if (is_addressed && (voices[lane].awake || !gesture.is_touch)) {
+        wake(keyboard, lane, first_channel);
         driver(lane, input).follow(goal, stroke.pole_of_position());
       }
     }
     return;
   }
-  if (!last) {
+  if (!latest) {
     return;
   }
-  wake(*last, first_channel);
-  set_pitch(*last, std::sqrt(voices_.factor_of(*last, parameters_.highest_factor())));
-  stroke.pitch = pitches_[*last];
-  gesture.play(driver(*last, input), stroke);
-  if (stroke.has_level && stroke.amount != 0.0) {
-    voices_.set_strength(*last, stroke.level());
+  wake(keyboard, *latest, first_channel);
+  Voice& voice = keyboard.voices[*latest];
+  set_pitch(*latest, std::sqrt(keyboard.factor_of(voice, parameters.highest_factor())));
+  stroke.pitch = pitches_[*latest];
+  gesture.play(driver(*latest, input), stroke);
+  if (stroke.settings.has_level && stroke.amount != 0.0) {
+    keyboard.set_strength(voice, stroke.level());
   }
   if (stroke.rest) {
     set_starts(scope.channels, input, *stroke.rest);
   }
   if (stroke.pressure) {
-    perform(Source::pressure, 0, *stroke.pressure, scope);
+    play(Source::pressure, 0, *stroke.pressure, scope, keyboard, parameters);
   }
 }
 
-void Gestures::perform(const Control& control, double amount, const Scope& scope) {
+void Gestures::play(const Control& control, double amount, const Scope& scope, Keyboard& keyboard,
+                    Parameters& parameters) {
   const Stroke stroke = stroke_of(control, amount);
   if (control.gesture == Gesture::parameter) {
-    return parameters_.set(control.target, stroke.mapped());
+    return parameters.set(control.target, stroke.mapped());
   }
-  play(row_of(control.gesture), control.target, stroke, scope);
+  play(row_of(control.gesture), control.target, stroke, scope, keyboard, parameters);
 }
 
-void Gestures::perform(Source source, int number, double amount, const Scope& scope) {
+void Gestures::play(Source source, int number, double amount, const Scope& scope,
+                    Keyboard& keyboard, Parameters& parameters) {
   for (const Control& control : playing_.controls) {
-    if (is_asked(control, source, number) && has_turn(control, strokes_)) {
-      perform(control, amount, scope);
+    if (matches(control, source, number) && has_turn(control, strokes_)) {
+      play(control, amount, scope, keyboard, parameters);
     }
   }
   strokes_ += source == Source::note ? 1 : 0;
 }
 
-// Where the next hand starts is as if the voice were a new one here.
-void Gestures::perform_elsewhere(int key, double amount, std::uint8_t channel) {
+void Gestures::follow_other_engine(int key, double amount, std::uint8_t channel, Keyboard& keyboard,
+                                   Parameters& parameters) {
   const Scope scope{.channels = channel_bit(channel)};
   for (const Control& control : playing_.controls) {
-    if (!is_asked(control, Source::note, key) || !has_turn(control, strokes_)) {
+    if (!matches(control, Source::note, key) || !has_turn(control, strokes_)) {
       continue;
     }
     const GestureRow& gesture = row_of(control.gesture);
     if (control.gesture == Gesture::parameter || gesture.goal != nullptr) {
-      perform(control, amount, scope);
+      play(control, amount, scope, keyboard, parameters);
       continue;
     }
-    Stroke stroke = on_input(control.target, stroke_of(control, amount));
-    InputDriver elsewhere;
-    elsewhere.place(starts_[channel * machine_.inputs.size() + control.target]);
-    gesture.play(elsewhere, stroke);
+    Stroke stroke = stroke_on(control.target, stroke_of(control, amount));
+    InputDriver silent;
+    silent.place(starts_[channel * machine_.inputs.size() + control.target]);
+    gesture.play(silent, stroke);
     if (stroke.rest) {
       set_starts(scope.channels, control.target, *stroke.rest);
     }
   }
-  ++strokes_;  // the turn passes on, whoever has it
+  ++strokes_;  // round robins advance in all engines alike
 }
 
-void Gestures::perform_live(const Event& event) {
+void Gestures::play_live(const Event& event, Keyboard& keyboard, Parameters& parameters) {
   const GestureRow& gesture = row_of(event.gesture);
-  const auto play_it = [&](std::size_t input, Stroke stroke) {
+  const auto play_on = [&](std::size_t input, Stroke stroke) {
     stroke.is_live = true;
     stroke.amount = event.value;
     stroke.second = event.value2;
-    play(gesture, input, stroke, Scope{});
+    play(gesture, input, stroke, Scope{}, keyboard, parameters);
   };
   const std::vector<Control>& controls = playing_.controls;
   if (gesture.live == Live::by_preset) {
@@ -203,23 +179,23 @@ void Gestures::perform_live(const Event& event) {
       return row.gesture == event.gesture && machine_.inputs[row.target].number == event.index;
     });
     if (control != controls.end()) {
-      play_it(control->target, stroke_of(*control));
+      play_on(control->target, stroke_of(*control));
     }
   } else if (gesture.live != Live::never) {
     for (std::size_t i = 0; i < machine_.inputs.size(); ++i) {
       if (machine_.inputs[i].number == event.index &&
           machine_.inputs[i].is_force == (gesture.live == Live::on_forces)) {
-        play_it(i, Stroke{});
+        play_on(i, Stroke{});
       }
     }
   }
 }
 
-void Gestures::release(std::size_t lane) {
+void Gestures::release(const Voice& voice, std::size_t lane) {
   for (const Control& control : playing_.controls) {
     const auto release = row_of(control.gesture).release;
-    if (release != nullptr && is_asked(control, Source::note, voices_[lane].key)) {
-      release(driver(lane, control.target), on_input(control.target, stroke_of(control)));
+    if (release != nullptr && matches(control, Source::note, voice.key)) {
+      release(driver(lane, control.target), stroke_on(control.target, stroke_of(control)));
     }
   }
 }
@@ -231,20 +207,21 @@ void Gestures::set_pitch(std::size_t lane, double pitch) {
   pitches_[lane] = pitch;
 }
 
-void Gestures::follow_pitches() {
-  for (std::size_t lane = 0; lane < voices_.size(); ++lane) {
-    if (voices_[lane].awake && voices_[lane].is_retuned) {
-      set_pitch(lane, std::sqrt(voices_[lane].factor));
+void Gestures::follow_pitch_changes(const Voices& voices) {
+  for (std::size_t lane = 0; lane < voices.size(); ++lane) {
+    if (voices[lane].awake && voices[lane].is_retuned) {
+      set_pitch(lane, std::sqrt(voices[lane].factor));
     }
   }
 }
 
-// Those of voices that sleep, too, so that their hands do not come to lie on anything.
+// The row includes the drivers of sleeping voices, so that these do not touch anything.
 template <class T>
-Gestures::Rest Gestures::rest(Bank<T>& bank, const VoiceGroup& group) const {
+Gestures::RowState Gestures::write_row(Bank<T>& bank, const VoiceGroup& group,
+                                       const Voices& voices) const {
   const PartBank<T>& part = bank.parts[group.part];
-  const std::size_t lanes = std::min(part.width, voices_.size() - group.first);
-  Rest rest;
+  const std::size_t lanes = std::min(part.width, voices.size() - group.first);
+  RowState state;
   bool is_new = false;
   T* row = bank.row.data();
   for (const InputSlot& slot : part.program.inputs) {
@@ -254,24 +231,25 @@ Gestures::Rest Gestures::rest(Bank<T>& bank, const VoiceGroup& group) const {
       const T value = static_cast<T>(mover.value());
       is_new |= !(value == row[lane]);
       row[lane] = value;
-      rest.is_any_moving |= mover.is_moving() && voices_[group.first + lane].awake;
-      rest.is_alike &= value == row[0];
+      state.is_any_moving |= mover.is_moving() && voices[group.first + lane].awake;
+      state.is_uniform &= value == row[0];
     }
     row += part.width;
   }
-  rest.is_alike &= !rest.is_any_moving;
+  state.is_uniform &= !state.is_any_moving;
   bank.filled_part = is_new ? nullptr : bank.filled_part;
-  return rest;
+  return state;
 }
 
-// Drivers that rest give every frame the same row.
+// Drivers at rest give every frame the same row and no velocity. The buffers keep that content from
+// block to block as long as nothing else writes to them.
 template <class T>
-void Gestures::fill_rest(Bank<T>& bank, const PartBank<T>& part, std::size_t frames) {
+void Gestures::fill_constant(Bank<T>& bank, const PartBank<T>& part, std::size_t frames) {
   const std::size_t inputs = part.program.inputs.size();
   const std::size_t step = inputs * bank.lanes_of_rows(part);
-  if (bank.still < frames * step) {
+  if (bank.zero_velocities < frames * step) {
     std::fill_n(bank.velocity.begin(), frames * step, T(0));
-    bank.still = frames * step;
+    bank.zero_velocities = frames * step;
   }
   if (bank.filled_part == &part && bank.filled_frames >= frames &&
       bank.filled_common == bank.is_common) {
@@ -291,11 +269,11 @@ void Gestures::fill_rest(Bank<T>& bank, const PartBank<T>& part, std::size_t fra
 }
 
 template <class T>
-void Gestures::fill(Bank<T>& bank, const VoiceGroup& group, std::size_t frames, const Rest& rest,
-                    EnergyWatch& watch) {
+void Gestures::fill_inputs(Bank<T>& bank, const VoiceGroup& group, std::size_t frames,
+                           const RowState& row_state, const Voices& voices, EnergyWatch& watch) {
   const PartBank<T>& part = bank.parts[group.part];
-  fill_rest(bank, part, frames);
-  if (!rest.is_any_moving) {
+  fill_constant(bank, part, frames);
+  if (!row_state.is_any_moving) {
     return;
   }
   const std::size_t step = part.program.inputs.size() * part.width;  // from frame to frame
@@ -303,10 +281,10 @@ void Gestures::fill(Bank<T>& bank, const VoiceGroup& group, std::size_t frames, 
     const InputSlot& slot = part.program.inputs[i];
     for (std::size_t lane = group.first; lane < group.end; ++lane) {
       InputDriver& mover = driver(lane, slot.input);
-      if (!voices_[lane].awake || !mover.is_moving()) {
+      if (!voices[lane].awake || !mover.is_moving()) {
         continue;
       }
-      watch.stir(voices_[lane], lane, group.part);
+      watch.mark_driven(voices[lane], lane, group.part);
       bank.filled_part = nullptr;
       T* value = bank.value.data() + i * part.width + lane - group.first;
       T* velocity = bank.velocity.data() + i * part.width + lane - group.first;
@@ -315,18 +293,20 @@ void Gestures::fill(Bank<T>& bank, const VoiceGroup& group, std::size_t frames, 
           value[n * step] = static_cast<T>(mover.next_force().value);
         }
       } else {
-        bank.still = 0;
+        bank.zero_velocities = 0;
         mover.fill_positions(frames, step, value, velocity);
       }
     }
   }
 }
 
-template Gestures::Rest Gestures::rest(Bank<float>&, const VoiceGroup&) const;
-template Gestures::Rest Gestures::rest(Bank<double>&, const VoiceGroup&) const;
-template void Gestures::fill(Bank<float>&, const VoiceGroup&, std::size_t, const Rest&,
-                             EnergyWatch&);
-template void Gestures::fill(Bank<double>&, const VoiceGroup&, std::size_t, const Rest&,
-                             EnergyWatch&);
+template Gestures::RowState Gestures::write_row(Bank<float>&, const VoiceGroup&,
+                                                const Voices&) const;
+template Gestures::RowState Gestures::write_row(Bank<double>&, const VoiceGroup&,
+                                                const Voices&) const;
+template void Gestures::fill_inputs(Bank<float>&, const VoiceGroup&, std::size_t, const RowState&,
+                                    const Voices&, EnergyWatch&);
+template void Gestures::fill_inputs(Bank<double>&, const VoiceGroup&, std::size_t, const RowState&,
+                                    const Voices&, EnergyWatch&);
 
 }  // namespace ressort::engine

@@ -1,63 +1,73 @@
-// core/engine: the gestures: what drives the inputs of every voice, and what the preset's controls
-// and live calls make of it.
+// core/engine: the gestures of all voices: controls and live calls move the drivers of inputs.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
+#include <cstdint>
+#include <span>
 #include <vector>
 
+#include "core/engine/bank.h"
 #include "core/engine/energy_watch.h"
 #include "core/engine/event.h"
-#include "core/engine/mixing/bank.h"
+#include "core/engine/keyboard.h"
 #include "core/engine/parameters.h"
-#include "core/engine/voices.h"
 #include "core/gesture.h"
 
 namespace ressort::engine {
 
-// A gesture wakes the voices that it plays, and may turn parameters. All functions but the
+// A gesture wakes the voices that it plays, and may change parameters. All functions but the
 // constructor: [audio] wait-free.
 class Gestures {
  public:
-  Gestures(const Machine& machine, const Playing& playing, Voices& voices, Parameters& parameters);
-  void go_on_from(const Gestures& from);
+  Gestures(const Machine& machine, const Playing& playing);
+  void continue_from(const Gestures& from);
 
-  // The drivers of a voice that starts: to where gestures begin.
-  void place(std::size_t lane);
-  // A voice that slept starts, with its hands where this channel has them.
-  void wake(std::size_t lane, std::uint8_t channel = 0);
+  // Puts the drivers of a starting voice to their initial positions.
+  void reset_drivers(const Voice& voice, std::size_t lane);
+  // Starts a sleeping voice with the driver positions of this channel.
+  void wake(Keyboard& keyboard, std::size_t lane, std::uint8_t channel = 0);
   bool is_moving(std::size_t lane, std::size_t input) const {
-    return drivers_[lane * machine_.inputs.size() + input].is_moving();
+    return driver(lane, input).is_moving();
   }
-  bool is_moving(std::size_t lane) const;
-  bool is_drawn(std::size_t lane) const;
+  bool is_any_moving(std::size_t lane) const {
+    return std::ranges::any_of(drivers_of(lane), &InputDriver::is_moving);
+  }
+  bool is_any_bowed(std::size_t lane) const {
+    return std::ranges::any_of(drivers_of(lane), &InputDriver::is_drawn);
+  }
 
-  // What the controls of this source, of this key or of this controller's number, do for 0..1. What
-  // has a goal moves in all voices that are meant, all else in the last of them; parameters are
-  // turned for everybody. O(controls * voices)
-  void perform(Source source, int number, double amount, const Scope& scope = {});
-  void perform(const Control& control, double amount, const Scope& scope = {});
-  // What a note does that another engine plays (NoteShare): to all voices, and to the next.
-  void perform_elsewhere(int key, double amount, std::uint8_t channel);
-  Scope of_last() const { return {.channels = channel_bit(voices_[voices_.last()].channel)}; }
-  // Of EventKind::gesture.
-  void perform_live(const Event& event);
-  // What a key does when it is released, in its voice.
-  void release(std::size_t lane);
-  // Voices have another pitch: what is drawn across them moves at the same speed in units of their
-  // own motion, so that a bow that is bent or glides goes on to catch its string.
-  void follow_pitches();
+  // Plays all controls of this source that match the key or the controller number, with an amount
+  // 0..1. A gesture with a goal moves in all voices of the scope, any other in the latest of them.
+  // Parameters change for all voices. O(controls * voices)
+  void play(Source source, int number, double amount, const Scope& scope, Keyboard& keyboard,
+            Parameters& parameters);
+  void play(const Control& control, double amount, const Scope& scope, Keyboard& keyboard,
+            Parameters& parameters);
+  // Follows a note that another engine plays (NoteShare). Gestures that move all voices are played;
+  // of the others only the position is kept at which the next one starts.
+  void follow_other_engine(int key, double amount, std::uint8_t channel, Keyboard& keyboard,
+                           Parameters& parameters);
+  // Handles EventKind::gesture.
+  void play_live(const Event& event, Keyboard& keyboard, Parameters& parameters);
+  // Ends the gestures of a voice's key when it is released.
+  void release(const Voice& voice, std::size_t lane);
+  // Adapts the speed of bows to the new pitch of retuned voices. In units of the string's motion
+  // the speed stays the same, so that a bent or gliding bow keeps its grip.
+  void follow_pitch_changes(const Voices& voices);
 
-  // Where the drivers are before a segment, in the bank's row.
-  struct Rest {
-    bool is_any_moving = false;  // of a voice that is awake
-    bool is_alike = true;        // none of these, and all lanes are in the same place
+  // Writes the drivers' positions before a segment to bank.row.
+  struct RowState {
+    bool is_any_moving = false;  // in an awake voice
+    bool is_uniform = true;      // nothing moves, and all lanes have the same positions
   };
   template <class T>
-  Rest rest(Bank<T>& bank, const VoiceGroup& group) const;
-  // After it: where they are in each frame.
+  RowState write_row(Bank<T>& bank, const VoiceGroup& group, const Voices& voices) const;
+  // Writes the drivers' positions and velocities in each frame of a segment. Called after
+  // write_row().
   template <class T>
-  void fill(Bank<T>& bank, const VoiceGroup& group, std::size_t frames, const Rest& rest,
-            EnergyWatch& watch);
+  void fill_inputs(Bank<T>& bank, const VoiceGroup& group, std::size_t frames,
+                   const RowState& row_state, const Voices& voices, EnergyWatch& watch);
 
  private:
   InputDriver& driver(std::size_t lane, std::size_t input) {
@@ -66,23 +76,23 @@ class Gestures {
   const InputDriver& driver(std::size_t lane, std::size_t input) const {
     return drivers_[lane * machine_.inputs.size() + input];
   }
-  // With what a gesture is to know of the input.
-  Stroke on_input(std::size_t input, Stroke stroke) const;
-  void play(const GestureRow& gesture, std::size_t input, Stroke stroke, const Scope& scope);
+  std::span<const InputDriver> drivers_of(std::size_t lane) const {
+    return std::span(drivers_).subspan(lane * machine_.inputs.size(), machine_.inputs.size());
+  }
+  Stroke stroke_on(std::size_t input, Stroke stroke) const;
+  void play(const GestureRow& gesture, std::size_t input, Stroke stroke, const Scope& scope,
+            Keyboard& keyboard, Parameters& parameters);
   void set_pitch(std::size_t lane, double pitch);
-  // Where the drivers of new voices on these channels start.
   void set_starts(ChannelMask channels, std::size_t input, double start);
   template <class T>
-  static void fill_rest(Bank<T>& bank, const PartBank<T>& part, std::size_t frames);
+  static void fill_constant(Bank<T>& bank, const PartBank<T>& part, std::size_t frames);
 
   const Machine& machine_;
   const Playing& playing_;
-  Voices& voices_;
-  Parameters& parameters_;
   std::vector<InputDriver> drivers_;  // [lane][input]
-  std::vector<double> pitches_;       // [lane] to that of the model, for which they move
-  std::vector<double> starts_;        // [channel][input] where a new voice's driver is
-  std::uint64_t strokes_ = 0;         // notes that were played: whose turn it is
+  std::vector<double> pitches_;  // [lane] ratio to the written pitch, for which bow speeds are set
+  std::vector<double> starts_;   // [channel][input] initial position of a new voice's driver
+  std::uint64_t strokes_ = 0;    // notes played so far, for round robins
 };
 
 }  // namespace ressort::engine

@@ -6,10 +6,10 @@
 namespace ressort::engine {
 namespace {
 
-// Steps are heard as clicks. A key's tuning follows its bends and glides from block to block.
+// Coefficients are ramped, because steps are audible as clicks. The ramp of a retuned voice spans
+// two blocks, from one bend or glide value to the next.
 constexpr std::size_t tuning_frames = 128;
-// A lever jumps farther than a hand moves what it turns; a controller's steps, some 10 ms from one
-// to the next, become one slope.
+// Ramp of a changed parameter. It joins the steps of a controller, which are about 10 ms apart.
 constexpr double turn_s = 0.02;
 
 }  // namespace
@@ -20,11 +20,11 @@ Parameters::Parameters(const Machine& machine, const Playing& playing)
       values_(machine.parameters),
       is_turned_(values_.size()) {
   turned_.reserve(values_.size());
-  changes_.reserve(Engine::max_changes);
-  taken_.reserve(Engine::max_changes);
+  changes_.reserve(max_parameter_changes);
+  taken_.reserve(max_parameter_changes);
 }
 
-void Parameters::go_on_from(const Parameters& from) {
+void Parameters::continue_from(const Parameters& from) {
   values_ = from.values_;
   changes_ = from.changes_;
   beyond_ = from.beyond_;
@@ -75,7 +75,7 @@ void Parameters::set(std::size_t index, double wanted) {
     turned_.push_back(parameter);
   }
   values_[index] = value;
-  if (changes_.size() < Engine::max_changes &&
+  if (changes_.size() < max_parameter_changes &&
       std::find(changes_.begin(), changes_.end(), parameter) == changes_.end()) {
     changes_.push_back(parameter);
   }
@@ -95,7 +95,7 @@ void Parameters::apply(Bank<T>& bank, const Voices& voices, EnergyWatch& watch) 
       return !depending[index].empty();
     });
     Kernel<T>& kernel = part.of(group.first);
-    std::size_t frames = 0;  // of the ramps that begin
+    std::size_t frames = 0;  // length of the ramps that start
     for (std::size_t lane = group.first; lane < group.end; ++lane) {
       const Voice& voice = voices[lane];
       const bool is_tuned = voice.is_new || voice.is_retuned;
@@ -103,10 +103,10 @@ void Parameters::apply(Bank<T>& bank, const Voices& voices, EnergyWatch& watch) 
         continue;
       }
       if (voice.is_new) {
-        watch.forget(lane, group.part);
+        watch.reset(lane, group.part);
         kernel.reset(lane - group.first);
       }
-      watch.stir(voice, lane, group.part);
+      watch.mark_driven(voice, lane, group.part);
       const bool ramped = !voice.is_new && !playing_.bare;
       const auto set = [&](std::uint32_t c) {
         const double value =

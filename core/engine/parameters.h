@@ -1,5 +1,5 @@
-// core/engine: the parameters: where each is, which have been turned, how high they leave keys to
-// be tuned, and what they make of the kernels' coefficients.
+// core/engine: the values of the model's parameters, and the kernels' coefficients that depend on
+// them.
 #pragma once
 
 #include <cstddef>
@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
+#include "core/engine/bank.h"
 #include "core/engine/energy_watch.h"
-#include "core/engine/mixing/bank.h"
 #include "core/engine/voices.h"
 
 namespace ressort::engine {
@@ -16,30 +16,30 @@ namespace ressort::engine {
 // All functions but the constructor: [audio] wait-free.
 class Parameters {
  public:
-  // With limits and home of every parameter.
+  // Playing must have `limits` and `home` for every parameter.
   Parameters(const Machine& machine, const Playing& playing);
-  void go_on_from(const Parameters& from);
+  void continue_from(const Parameters& from);
 
   std::span<const double> values() const { return values_; }
-  // To the nearest value that it may have; nothing where there is no such parameter.
+  // Sets a parameter, clamped to its limits. Ignores an unknown index.
   void set(std::size_t index, double wanted);
-  // The stiffness factor that they, as they are, leave to keys and bend. O(parameters)
+  // Returns the greatest stable stiffness factor at the current values. O(parameters)
   double highest_factor() const;
 
-  // Since the last apply():
+  // Changes since the last apply().
   bool has_changed() const { return !turned_.empty(); }
   bool has_changed_highest_factor() const;
 
-  // Brings the kernels to what the events before a segment want, once, however many they were:
-  // voices that are new to the start, and all that depends on what has changed.
+  // Applies all events before a segment to the kernels at once: resets new voices, and sets the
+  // coefficients that depend on changed parameters and retuned voices.
   template <class T>
   void apply(Bank<T>& bank, const Voices& voices, EnergyWatch& watch);
-  // What depends on a parameter that audio gives, for every sample.
+  // Computes the coefficients that depend on audio parameters, for every sample.
   template <class T>
   void fill_audio(Bank<T>& bank, const VoiceGroup& group, const Segment& segment,
                   const Voices& voices);
 
-  // As Engine::take_changes says.
+  // See Engine::take_changes().
   std::span<const std::uint16_t> take_changes();
   std::uint64_t beyond() const { return beyond_; }
 
@@ -47,13 +47,13 @@ class Parameters {
   double within_limits(std::size_t index, double value) const;
 
   const Playing& playing_;
-  std::size_t turn_frames_;  // that a turned parameter takes
+  std::size_t turn_frames_;  // ramp of a changed parameter
   std::vector<double> values_;
   std::vector<std::uint16_t> turned_;   // since the last apply()
   std::vector<bool> is_turned_;         // [parameter]
-  double highest_before_ = 1.0;         // highest_factor() before the first of them
+  double highest_before_ = 1.0;         // highest_factor() before the first of these changes
   std::vector<std::uint16_t> changes_;  // since the last take_changes()
-  std::vector<std::uint16_t> taken_;    // by it
+  std::vector<std::uint16_t> taken_;    // result of the last take_changes()
   std::uint64_t beyond_ = 0;
 };
 

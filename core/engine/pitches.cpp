@@ -1,13 +1,11 @@
-#include <algorithm>
-#include <array>
-#include <cmath>
+#include "core/engine/pitches.h"
 
-#include "core/engine/engine.h"
+#include <algorithm>
 
 namespace ressort::engine {
 namespace {
 
-// Through four values, at 0, 1, 2 and 3.
+// The cubic Lagrange polynomial through the values y at 0, 1, 2 and 3.
 double cubic(double t, const std::array<double, 4>& y) {
   return -(t - 1.0) * (t - 2.0) * (t - 3.0) / 6.0 * y[0] + t * (t - 2.0) * (t - 3.0) / 2.0 * y[1] -
          t * (t - 1.0) * (t - 3.0) / 2.0 * y[2] + t * (t - 1.0) * (t - 2.0) / 6.0 * y[3];
@@ -23,7 +21,8 @@ double Pitches::factor_at(double frequency_hz) const {
   const auto last = static_cast<double>(factors.size() - 1);
   const double semitone = 12.0 * std::log2(frequency_hz / lowest_hz);
   if (factors.size() < 4 || semitone <= 0.0 || semitone >= last) {
-    // Beyond, as if there were no dampers.
+    // Outside the table the frequency is proportional to the root of the stiffness, as without
+    // dampers.
     const double end = semitone <= 0.0 ? 0.0 : last;
     return std::max(least,
                     factors[static_cast<std::size_t>(end)] * std::exp2((semitone - end) / 6.0));
@@ -44,7 +43,7 @@ double PitchesAlong::factor_at(double frequency_hz, double value) const {
   const double inside = std::clamp(value, lowest, highest);
   const double way = by_ratios ? std::log(inside / lowest) / std::log(highest / lowest)
                                : (inside - lowest) / (highest - lowest);
-  // The four are of one leg.
+  // All four points must belong to one leg.
   const double legs_gone = way * static_cast<double>(legs);
   const double leg = std::min(std::floor(legs_gone), static_cast<double>(legs - 1));
   const double within = (legs_gone - leg) * static_cast<double>(steps);

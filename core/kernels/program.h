@@ -31,6 +31,7 @@ struct SampledCoefficients {
   std::uint32_t inverse_mass = 0;
   std::uint32_t stiffness = 0;
   std::uint32_t damping = 0;
+  bool operator==(const SampledCoefficients&) const = default;
 };
 
 // Consecutive nodes that share their coefficients.
@@ -44,6 +45,7 @@ struct MassRun {
   bool is_oscillator = false;
   bool has_gravity = false;
   bool is_junction = false;  // places on waveguides
+  bool operator==(const MassRun&) const = default;
 };
 
 // The method that computes the force of a link.
@@ -60,17 +62,20 @@ struct LinkRun {
   std::uint32_t first = 0;
   std::uint32_t count = 0;
   std::array<std::uint32_t, most_law_arguments> coefficients{};  // of the law's arguments
+  bool operator==(const LinkRun&) const = default;
 };
 
 struct Ends {
   std::uint32_t a = 0;  // nodes
   std::uint32_t b = 0;
+  bool operator==(const Ends&) const = default;
 };
 
 struct InputSlot {
   std::uint32_t input = 0;  // index into Machine::inputs
   bool is_force = false;
   std::uint32_t node = 0;
+  bool operator==(const InputSlot&) const = default;
 };
 
 struct OutputSlot {
@@ -87,6 +92,7 @@ struct OutputSlot {
 struct AudioParameter {
   std::uint32_t parameter = 0;
   int channel = 0;  // from 0
+  bool operator==(const AudioParameter&) const = default;
 };
 
 // A point on a rectangle of length * width nodes, by coordinates 0..1. It has no inertia: its
@@ -105,6 +111,7 @@ struct TapSlot {
   std::uint32_t places = 0;  // 0: not on a body
   std::uint32_t shape = 0;   // first index into Program::shapes, [place][mode]
   bool is_on_body() const { return places > 0; }
+  bool operator==(const TapSlot&) const = default;
 };
 
 // A string or a tube as two travelling waves (core/kernels/waveguides).
@@ -117,12 +124,14 @@ struct WaveguideSlot {
   FiltersAt filters_at;
   std::uint32_t first = 0;  // index of its first place in Program::junctions
   std::uint32_t count = 0;
+  bool operator==(const WaveguideSlot&) const = default;
 };
 
 // A place on a waveguide: a node with an inverse mass that the waves move.
 struct JunctionSlot {
   std::uint32_t node = 0;
   std::uint32_t u = 0;  // coefficient: position between the ends, 0..1
+  bool operator==(const JunctionSlot&) const = default;
 };
 
 // A connected part of a network. The nodes are numbered in this order: moving masses, run by run;
@@ -170,6 +179,7 @@ struct ModelInput {
   int number = 1;  // from 1, as in the model
   bool is_force = false;
   double position = 0.0;  // at the start; 0 for a force
+  bool operator==(const ModelInput&) const = default;
 };
 
 // A whole network: its connected parts, each a Program with the same parameters.

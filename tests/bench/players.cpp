@@ -150,8 +150,7 @@ class EnginePlayer : public Player {
   static Playing playing(const BenchScene& scene, const Network& network, const Machine& machine) {
     Playing playing{.voices = static_cast<int>(scene.voices)};
     for (std::uint16_t i = 0; i < machine.inputs.size(); ++i) {
-      playing.controls.push_back(
-          {.source = Source::audio, .number = i, .target = i, .low = 0.0, .high = 1.0});
+      playing.controls.push_back({.source = Source::audio, .number = i, .target = i});
     }
     if (const auto shapes = scene.voices > 1 ? lowest_shapes(network, machine.parameters)
                                              : std::optional<LowestShapes>()) {

@@ -125,7 +125,7 @@ void play(const Network& network, Preset preset, CompileOptions options) {
   options.most_modes = patient_modes;
   const auto second = compile_network(network, preset, options);
   require(static_cast<bool>(second));
-  second->engine->go_on_from(*first->engine);
+  second->engine->continue_from(*first->engine);
   play_blocks(*second->engine, second->instrument, blocks / 2, blocks);
 }
 

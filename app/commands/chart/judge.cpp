@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "app/commands/chart/reference_scheme.h"
 #include "core/analysis/continuous.h"
 #include "core/compile/machine.h"
-#include "core/engine/reference.h"
 
 namespace ressort::commands {
 namespace {
@@ -211,7 +211,7 @@ std::optional<EnergyReading> watch_energy(const ChartScene& scene, MadeWay& way,
         v[i][node] *= times;
         next_v[i][node] *= times;
       }
-      const StoredEnergy more = energy_of(*programs[i], x[i], v[i], next_v[i]);
+      const StoredEnergy more = stored_energy(*programs[i], x[i], v[i], next_v[i]);
       energy.total += more.total;
       energy.held += more.held;
     }

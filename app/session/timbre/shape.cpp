@@ -8,7 +8,7 @@
 #include "app/session/timbre/timbre_figures.h"
 #include "app/text.h"
 #include "core/analysis/modes/scaling.h"
-#include "core/engine/midi/velocity_curve.h"
+#include "core/engine/playing.h"
 #include "core/gesture.h"
 #include "core/laws/law.h"
 #include "core/model/language/expression.h"
@@ -110,11 +110,11 @@ std::vector<StrikePulse> blows_of(const ShapeRequest& request) {
     constexpr double to_a_microsecond = 1e6;
     const Stroke stroke{.amount = velocity(usual_velocity),
                         .has_control = true,
-                        .low = control.low,
-                        .high = control.high,
-                        .exponential = control.exponential,
-                        .longest_s = control.longest_ms / 1e3,
-                        .shortest_s = control.shortest_ms / 1e3,
+                        .settings = {.low = control.low,
+                                     .high = control.high,
+                                     .exponential = control.exponential,
+                                     .longest_s = control.longest_ms / 1e3,
+                                     .shortest_s = control.shortest_ms / 1e3},
                         .rate_hz = to_a_microsecond};
     blows.push_back({.input = static_cast<std::size_t>(input),
                      .strength = stroke.mapped(),

@@ -7,9 +7,8 @@
 namespace ressort::engine {
 namespace {
 
-// Controllers, by their numbers in MIDI 1.0.
+// Controller numbers of MIDI 1.0.
 enum Number : int {
-  modulation_wheel = 1,
   portamento_time = 5,
   data_entry = 6,
   volume = 7,
@@ -29,7 +28,7 @@ enum Number : int {
   registered_coarse = 101,
 };
 
-// Registered parameters.
+// Registered parameter numbers (RPN).
 enum Parameter : int {
   bend_range = 0,
   fine_tuning = 1,
@@ -39,13 +38,13 @@ enum Parameter : int {
 };
 
 constexpr int most_data = 0x3fff;
-constexpr double member_bend_range = 48.0;  // semitones, of MPE
+constexpr double member_bend_range = 48.0;  // semitones, by MPE 1.0
 static_assert(member_bend_range == note_bend_semitones);
 constexpr double usual_bend_range = 2.0;
-constexpr double usual_depth_data = 64.0;  // 50 cents, in 128ths of a semitone, of General MIDI 2
+constexpr double usual_depth_data = 64.0;  // 50 cents in 128ths of a semitone, by General MIDI 2
 
-// From the left, -1, to the right; 64 is the middle, 1 as far to the left as 127 to the right, and
-// 0 no further, as General MIDI 2 has it (RP-036).
+// Returns the pan position from -1 (left) to 1 (right). By General MIDI 2 (RP-036), 64 is the
+// middle, and both 0 and 1 are fully left.
 double pan_of(double value) {
   const double place = (127.0 * value - 64.0) / 63.0;
   constexpr double rounding = 1e-9;
@@ -153,7 +152,7 @@ Channels::Change Channels::enter(std::uint8_t index) {
   }
 }
 
-// What is said to one member holds for all of them.
+// The bend range of one member applies to all members of its zone.
 Channels::Change Channels::set_bend_range(std::uint8_t index, double semitones) {
   const std::uint8_t master = master_of(index);
   for (std::uint8_t other = 0; other < midi_channel_count; ++other) {
@@ -165,8 +164,8 @@ Channels::Change Channels::set_bend_range(std::uint8_t index, double semitones) 
   return Change::pitch;
 }
 
-// Where two zones would overlap the newer one has the channels. On other channels the message means
-// nothing.
+// If two zones overlap, the newer one gets the channels. The message is ignored on channels that
+// cannot be a master.
 Channels::Change Channels::set_zone(std::uint8_t master, int members) {
   constexpr int most_members = 15;
   constexpr int most_of_both = 14;
@@ -259,7 +258,7 @@ SideGains Channels::balance(std::uint8_t channel) const {
   if (place == 0.0) {
     return {1.0, 1.0};
   }
-  // The cosine of one angle is the sine of the other, and exactly 0 at its end.
+  // The sine is used on both sides, because it is exactly 0 at the far end, unlike the cosine.
   const auto gain = [](double share) {
     return std::numbers::sqrt2 * std::sin(0.25 * std::numbers::pi * share);
   };
@@ -267,9 +266,9 @@ SideGains Channels::balance(std::uint8_t channel) const {
 }
 
 double Channels::damper(std::uint8_t channel) const {
-  // A lightly laid damper takes little: what it takes goes with the square of how far it lies.
-  const double lies = std::clamp(1.5 - 2.0 * pedal(channel), 0.0, 1.0);
-  return lies * lies;
+  // Damping grows with the square of the damper's contact.
+  const double contact = std::clamp(1.5 - 2.0 * pedal(channel), 0.0, 1.0);
+  return contact * contact;
 }
 
 double Channels::softness(std::uint8_t channel) const {
@@ -282,9 +281,9 @@ double Channels::modulation(std::uint8_t channel) const {
 }
 
 double Channels::glide_s(std::uint8_t channel, double preset) const {
-  const Channel& said = is_member(channel) && zone(channel).glides ? zone(channel) : of(channel);
-  const bool glides = said.glides.value_or(preset > 0.0);
-  return glides ? said.glide_s.value_or(preset) : 0.0;
+  const Channel& c = is_member(channel) && zone(channel).glides ? zone(channel) : of(channel);
+  const bool glides = c.glides.value_or(preset > 0.0);
+  return glides ? c.glide_s.value_or(preset) : 0.0;
 }
 
 }  // namespace ressort::engine

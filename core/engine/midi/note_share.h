@@ -1,6 +1,5 @@
-// core/engine/midi: which notes are an engine's own, where several play the voices of one
-// instrument in turn. All of them hear the same notes from the beginning, so that each knows what
-// the others take.
+// core/engine/midi: distributes notes over several engines that play one instrument together. All
+// engines receive the same events from the start, so each computes the same distribution.
 #pragma once
 
 #include <array>
@@ -11,13 +10,13 @@
 
 namespace ressort::engine {
 
-// One of so many. All functions: [audio] wait-free.
+// All functions: [audio] wait-free.
 class NoteShare {
  public:
   static constexpr int most_parts = 64;
   struct Part {
-    int number = 1;  // from 1
-    int of = 1;
+    int number = 1;  // of this engine, from 1
+    int of = 1;      // number of engines
   };
 
   explicit NoteShare(Part part) : part_(part) {}
@@ -26,9 +25,9 @@ class NoteShare {
     next_ = from.next_;
   }
 
-  // A key goes down: whether its note is this engine's. The engines take new keys in turn. One that
-  // has been played before stays where it was, as its last note may ring there.
-  bool takes(std::uint8_t channel, std::size_t key) {
+  // Returns whether this engine plays a pressed key. New keys go to the engines in turn. A repeated
+  // key stays with its engine, where its last note may still ring.
+  bool owns(std::uint8_t channel, std::size_t key) {
     if (part_.of == 1) {
       return true;
     }
@@ -39,17 +38,18 @@ class NoteShare {
     }
     return owner == part_.number;
   }
-  // What is one voice only is the first engine's.
+  // The first engine plays everything that uses one voice only.
   bool is_first() const { return part_.number == 1; }
-  // Nothing rings any more: the next key is the first engine's.
-  void begin_anew() {
+  // Forgets all keys. The next key goes to the first engine.
+  void restart() {
     owners_ = {};
     next_ = 0;
   }
 
  private:
   Part part_;
-  std::array<std::array<std::uint8_t, 128>, Channels::count> owners_{};  // [channel][key] or 0
+  std::array<std::array<std::uint8_t, 128>, Channels::count>
+      owners_{};  // [channel][key] engine from 1; 0: none
   int next_ = 0;
 };
 

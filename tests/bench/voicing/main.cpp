@@ -19,7 +19,7 @@
 #include "app/commands/offline.h"
 #include "app/control/registry.h"
 #include "app/session/files.h"
-#include "core/engine/mixing/limiter.h"
+#include "core/engine/limiter.h"
 #include "tests/bench/voicing/player.h"
 #include "tests/bench/voicing/random_settings.h"
 #include "tests/bench/voicing/sound.h"

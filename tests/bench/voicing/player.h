@@ -7,7 +7,7 @@
 
 #include "app/session/loader.h"
 #include "core/compile/compile.h"
-#include "core/engine/mixing/dc_blocker.h"
+#include "core/engine/dc_blocker.h"
 #include "tests/bench/voicing/sound.h"
 #include "tests/support/rooms.h"
 

@@ -6,8 +6,8 @@
 #include <numbers>
 
 #include "app/commands/chart/judge.h"
+#include "app/commands/chart/reference_scheme.h"
 #include "core/analysis/continuous.h"
-#include "core/engine/reference.h"
 #include "core/model/language/mdl.h"
 #include "tests/support/catch.h"
 #include "tests/support/harness.h"

@@ -1,8 +1,8 @@
-// What a key says beside its pitch: how loud and how bright, and how its damper comes on.
+// Properties of a note besides its pitch: loudness, brightness and the action of its damper.
 #include <cmath>
 #include <numbers>
 
-#include "core/engine/mixing/dc_blocker.h"
+#include "core/engine/dc_blocker.h"
 #include "tests/support/catch.h"
 #include "tests/support/player.h"
 
@@ -17,9 +17,9 @@ using support::Player;
 using support::ringing_string;
 using support::struck;
 
-// How many seconds 60 dB take, by what is left of a note from one time to a later one.
+// Returns the T60 in seconds, from the ratio of a damped to a held note at two times.
 double t60_s(const Player& player, const Player& held, std::size_t from, std::size_t to) {
-  // Where the held one is loud: there their quotient is well known.
+  // Compares where the held note is loud, because the ratio is most accurate there.
   const auto loud = [&](std::size_t at) {
     const auto first = held.y().begin() + static_cast<std::ptrdiff_t>(at);
     const auto most = std::max_element(
@@ -38,7 +38,7 @@ Preset damped(double seconds, int voices = 1) {
   return preset;
 }
 
-TEST_CASE("a key that goes up fast damps fast", "[dampers]") {
+TEST_CASE("a key released fast is damped fast", "[dampers]") {
   Player held(ringing_string(), damped(0.4));
   held.run(30000, {note_on(0, 60)});
   for (const auto& [velocity, factor] :
@@ -49,10 +49,11 @@ TEST_CASE("a key that goes up fast damps fast", "[dampers]") {
   }
 }
 
-TEST_CASE("a half pedal lets dampers lie lightly", "[dampers]") {
+TEST_CASE("a half pedal damps lightly", "[dampers]") {
   Player held(ringing_string(), damped(0.2));
   held.run(30000, {note_on(0, 60)});
-  // Up to a quarter they lie, from three quarters on they are off, between with the square.
+  // The damper lies fully up to a quarter of the pedal's travel, is off from three quarters on, and
+  // has a square law between.
   for (const auto& [pedal, share] : {std::pair(0.0, 1.0), std::pair(0.25, 1.0),
                                      std::pair(0.5, 0.25), std::pair(0.625, 0.0625)}) {
     Player player(ringing_string(), damped(0.2));
@@ -63,7 +64,7 @@ TEST_CASE("a half pedal lets dampers lie lightly", "[dampers]") {
   Player off(ringing_string(), damped(0.2));
   off.run(30000, {note_on(0, 60), controller(500, 64, 0.75), note_off(2000, 60)});
   CHECK(off.y() == held.y());
-  // And a pedal that goes down late catches what is left, which rings on.
+  // A pedal pressed late catches the rest of the note, which rings on.
   Player caught(ringing_string(), damped(0.2));
   caught.run(30000, {note_on(0, 60), note_off(2000, 60), controller(5000, 64, 1.0)});
   const double left = caught.y()[20000] / held.y()[20000];
@@ -72,7 +73,7 @@ TEST_CASE("a half pedal lets dampers lie lightly", "[dampers]") {
   CHECK(caught.y()[29000] == Approx(left * held.y()[29000]).epsilon(1e-9));
 }
 
-TEST_CASE("a key that is damped starts anew beside what is left", "[dampers]") {
+TEST_CASE("a damped key starts a new voice beside the old one", "[dampers]") {
   Player first(ringing_string(), damped(0.2, 2));
   first.run(20000, {note_on(0, 60), note_off(2000, 60)});
   Player fresh(ringing_string(), damped(0.2, 2));
@@ -82,14 +83,14 @@ TEST_CASE("a key that is damped starts anew beside what is left", "[dampers]") {
   for (std::size_t n = 0; n < 10000; ++n) {
     REQUIRE(std::fabs(both.y()[10000 + n] - first.y()[10000 + n] - fresh.y()[n]) < 1e-12);
   }
-  // Under the pedal nothing was damped: the same string is struck again.
+  // Under the pedal nothing was damped, so the same voice is struck again.
   Player again(ringing_string(), damped(0.2, 2));
   again.run(20000,
             {note_on(0, 60), controller(10, 64, 1.0), note_off(2000, 60), note_on(10000, 60)});
   CHECK(again.engine().meters().voices == 1);
 }
 
-TEST_CASE("what a hand has plucked without a key ends with the last of the keys", "[dampers]") {
+TEST_CASE("a live pluck without a key is damped when the last key is released", "[dampers]") {
   const std::string plucked = scenes::string("s", 10, "0.1", "0.0005") +
                               "@in1 posInput 0.\n@p nlPluck @in1 @s_m2 0.1 0.01\n" +
                               scenes::output(1, "s_m6");
@@ -107,7 +108,7 @@ TEST_CASE("what a hand has plucked without a key ends with the last of the keys"
     player.run(44100, events);
     return peak(std::span(player.y()).last(4000)) / peak(std::span(player.y()).first(9000));
   };
-  // Keys that play nothing themselves: what is heard is the hand's.
+  // The keys play nothing themselves, so only the live pluck is audible.
   const Event swept = controller(0, 1, 1.0);
   const double rings = left({swept});
   CHECK(rings > 0.1);
@@ -116,14 +117,13 @@ TEST_CASE("what a hand has plucked without a key ends with the last of the keys"
         Approx(rings).epsilon(1e-3));
   CHECK(left({swept, controller(0, 64, 1.0), note_on(9000, 60), note_off(15000, 60)}) ==
         Approx(rings).epsilon(1e-3));
-  // 25 100 frames of a T60 of 8820 are 171 dB; at -120 a voice ends.
+  // The decay in 25 100 frames at a T60 of 8820 frames is 171 dB. A voice ends at -120 dB.
   CHECK(left({swept, note_on(9000, 60), note_off(15000, 60)}) < 1e-5);
   CHECK(left({swept, note_on(9000, 60), note_on(9000, 62), note_off(15000, 60),
               note_off(15000, 62)}) < 1e-5);
 }
 
-TEST_CASE("what decays by its key does so at its T60, under a damper and a pedal too",
-          "[dampers]") {
+TEST_CASE("a decay by key has its T60, with a damper and with a pedal too", "[dampers]") {
   Preset preset = damped(0.4);
   preset.decay_s = {{48.0, 2.0}, {72.0, 0.5}};
   for (const auto& [key, seconds] : {std::pair(36, 2.0), std::pair(48, 2.0), std::pair(60, 1.25),
@@ -134,7 +134,7 @@ TEST_CASE("what decays by its key does so at its T60, under a damper and a pedal
     player.run(30000, {note_on(0, key)});
     INFO(key);
     CHECK(t60_s(player, rings, 4000, 12000) == Approx(seconds).epsilon(1e-3));
-    // 1/T60 is the sum of both.
+    // The rates 1/T60 add up.
     Player let_go(ringing_string(), preset);
     let_go.run(30000, {note_on(0, key), note_off(2000, key)});
     CHECK(t60_s(let_go, rings, 4000, 6000) ==
@@ -145,7 +145,7 @@ TEST_CASE("what decays by its key does so at its T60, under a damper and a pedal
   }
 }
 
-TEST_CASE("one voice that decays by its key is struck anew, and moves on where it is legato",
+TEST_CASE("a mono voice with a decay by key is struck anew, but only moves in legato",
           "[dampers]") {
   Preset preset = damped(0.4, 4);
   preset.mono = true;
@@ -159,21 +159,23 @@ TEST_CASE("one voice that decays by its key is struck anew, and moves on where i
   Player other(ringing_string(), preset);
   other.run(20000, {note_on(0, 64)});
   const auto late = [](const std::vector<double>& y) { return peak(std::span(y).subspan(30000)); };
-  // Anew: 10 000 frames after its stroke it is as loud as one that was struck alone, and of the
-  // first, which took 27 dB in 20 000 frames and is stopped in 0.2 s, 95 dB are gone.
+  // The voice is new: 10 000 frames after its stroke it is as loud as one that was struck alone.
+  // The first stroke lost 27 dB in 20 000 frames and is damped in 0.2 s, so 95 dB are gone.
   CHECK(late(played(false)) == Approx(peak(std::span(other.y()).subspan(10000))).epsilon(1e-3));
   CHECK(late(played(true)) < 0.1 * late(played(false)));
   CHECK(late(played(true)) > 0.001 * late(played(false)));
 }
 
-TEST_CASE("a note that is damped away ends", "[dampers]") {
+TEST_CASE("a fully damped note ends", "[dampers]") {
   Player player(ringing_string(), damped(0.1, 4));
   player.run(44100, {note_on(0, 60), note_on(0, 64), note_off(100, 60), note_off(100, 64)});
   CHECK(player.engine().meters().stepped == 0);
 }
 
-TEST_CASE("keys_db makes a key louder, at once where it is struck and in 20 ms where it moves on",
-          "[dampers]") {
+TEST_CASE(
+    "keys_db changes the gain of a key, at once if it is struck and in 20 ms if a voice moves to "
+    "it",
+    "[dampers]") {
   Preset preset = struck(2);
   const auto played = [&](std::vector<CurvePoint> keys_db, std::vector<Event> events) {
     preset.keys_db = std::move(keys_db);
@@ -199,14 +201,14 @@ TEST_CASE("keys_db makes a key louder, at once where it is struck and in 20 ms w
   for (std::size_t i = 0; i < plain.size(); ++i) {
     const double way = std::clamp((static_cast<double>(i) - 2000.0) / 882.0, 0.0, 1.0);
     const double loudness = low + way * (high - low);
-    // A level is as it is for up to a sample of its way: an 882nd of it.
+    // The ramp has 882 steps, and the tolerance is one of them.
     REQUIRE(scaled[i] ==
             Approx(loudness * plain[i]).margin(1e-15 + (low - high) / 882.0 * std::fabs(plain[i])));
   }
 }
 
-TEST_CASE("level_db makes a note louder and nothing else", "[dampers]") {
-  // 20 dB from the softest to the loudest, in equal steps of dB.
+TEST_CASE("level_db changes the loudness of a note and nothing else", "[dampers]") {
+  // The range of 20 dB is divided into equal steps of dB.
   const auto with_level = [](double velocity) {
     Preset preset = struck(1);
     preset.controls[0].low = 0.1;
@@ -224,7 +226,7 @@ TEST_CASE("level_db makes a note louder and nothing else", "[dampers]") {
   }
 }
 
-TEST_CASE("a key that is pressed again stops what rings by it", "[dampers]") {
+TEST_CASE("a repeated key damps the earlier voice of that key", "[dampers]") {
   Preset preset = struck(8);
   preset.controls[0].has_level = true;
   Player player(ringing_string(), preset);
@@ -234,14 +236,14 @@ TEST_CASE("a key that is pressed again stops what rings by it", "[dampers]") {
   }
   player.run(4410 * 10, events);
   CHECK(player.engine().meters().stolen == 0);
-  // T60 of 0.2 s: four others are less than 120 dB down; half a second later none is.
+  // The T60 is 0.2 s, so four other voices are less than 120 dB down. Half a second later none is.
   CHECK(player.engine().meters().stepped <= 5);
   player.run(22050);
   CHECK(player.engine().meters().stepped == 1);
 }
 
 TEST_CASE("a long blow gives as much momentum as a short one", "[dampers]") {
-  // A free mass of 1: after the blow it moves at F / M a sample, which its position shows.
+  // A free mass of 1 moves at F / M per sample after the blow, as its position shows.
   const std::string text = "@m mass 1 0 0\n@in1 frcInput @m\n@out1 posOutput @m\n";
   for (const double length_ms : {0.0, 0.5, 4.0}) {
     Preset preset = struck(1);
@@ -251,7 +253,8 @@ TEST_CASE("a long blow gives as much momentum as a short one", "[dampers]") {
     player.run(1000, {note_on(0, 60)});
     CHECK(player.y()[999] - player.y()[998] == Approx(0.1).epsilon(1e-9));
   }
-  // And is duller: what a raised cosine of 4 ms leaves of 2 kHz is below a hundredth.
+  // The long blow is duller: a raised cosine of 4 ms leaves less than 1 % of the amplitude at 2
+  // kHz.
   const auto at_2khz = [&](double length_ms) {
     Preset preset = struck(1);
     preset.keyboard = false;
@@ -267,7 +270,7 @@ TEST_CASE("a long blow gives as much momentum as a short one", "[dampers]") {
   CHECK(at_2khz(0.25) > 0.8 * at_2khz(0.0));
 }
 
-TEST_CASE("a finger rests off the string and is laid on by a lever", "[dampers]") {
+TEST_CASE("a touch finger rests off the string and is laid on by a controller", "[dampers]") {
   Preset preset;
   preset.keyboard = false;
   preset.controls.push_back({.source = ControlSource::controller,
@@ -282,7 +285,7 @@ TEST_CASE("a finger rests off the string and is laid on by a lever", "[dampers]"
       preset);
   player.run(20000, {controller(100, 16, 0.5)});
   CHECK(player.y()[0] == -3.0);
-  // Where nothing sounds it wakes nobody.
+  // A touch wakes no sleeping voice.
   Player silent(
       "@m mass 1 0 0\n@in1 posInput 0\n@t contact @in1 @m 0.1 0 0\n"
       "@s springDamper @m @g 0.1 0.01\n@g ground 0\n@out1 posOutput @m\n",
@@ -294,7 +297,7 @@ TEST_CASE("a finger rests off the string and is laid on by a lever", "[dampers]"
   CHECK(player.y()[19999] == Approx(-1.0).epsilon(1e-8));
 }
 
-TEST_CASE("DC is blocked at 5 Hz, and nothing above 60 Hz is touched", "[dampers]") {
+TEST_CASE("DC is blocked below 5 Hz, and nothing above 60 Hz changes", "[dampers]") {
   constexpr double rate_hz = 48000.0;
   const auto response = [&](double hz) {
     DcBlocker blocker(rate_hz);
@@ -309,13 +312,13 @@ TEST_CASE("DC is blocked at 5 Hz, and nothing above 60 Hz is touched", "[dampers
   CHECK(response(0.0) < 1e-12);
   CHECK(response(5.0) == Approx(std::numbers::sqrt2 / 2.0).epsilon(1e-3));
   CHECK(20.0 * std::log10(response(60.0)) > -0.05);
-  // A step is 60 dB down within a second.
+  // A step decays by 60 dB within a second.
   DcBlocker blocker(rate_hz);
   std::vector<double> step(48001, 1.0);
   double* const channel = step.data();
   blocker.process({&channel, 1}, step.size());
   CHECK(std::fabs(step.back()) < 1e-3);
-  // Where sound ends, so does what is left of it: a ten millionth is 16 time constants of 0.5 ms.
+  // After the sound ends the filter's state decays too: 1e-7 takes 16 time constants of 0.5 ms.
   std::vector<double> nothing(480, 0.0);
   double* const after = nothing.data();
   blocker.process({&after, 1}, nothing.size());

@@ -1,5 +1,5 @@
-// The limiter: nothing passes the ceiling, nothing is touched below it.
-#include "core/engine/mixing/limiter.h"
+// The limiter never exceeds the ceiling and does not change anything below it.
+#include "core/engine/limiter.h"
 
 #include "tests/support/player.h"
 
@@ -12,7 +12,7 @@ constexpr std::size_t late = Limiter::lookahead_frames;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// One channel through a new limiter, in blocks.
+// Runs one channel through a new limiter in blocks.
 std::vector<double> limited(std::vector<double> y, std::size_t block = 64) {
   Limiter limiter(44100.0);
   for (std::size_t at = 0; at < y.size(); at += block) {
@@ -32,7 +32,7 @@ std::vector<double> sine(double amplitude, double hz, std::size_t frames) {
 
 }  // namespace
 
-TEST_CASE("below the ceiling it is a delay of 48 frames, bit for bit", "[limiter]") {
+TEST_CASE("below the ceiling the limiter is a delay of 48 frames, bit for bit", "[limiter]") {
   Random random(1);
   std::vector<double> y(20000);
   for (double& sample : y) {
@@ -47,7 +47,7 @@ TEST_CASE("below the ceiling it is a delay of 48 frames, bit for bit", "[limiter
   }
 }
 
-TEST_CASE("nothing passes the ceiling, whatever comes", "[limiter]") {
+TEST_CASE("the output never exceeds the ceiling", "[limiter]") {
   std::vector<std::vector<double>> loud;
   for (const double amplitude : {1.0, 2.0, 10.0, 1e6, 1e12, 1e300}) {
     loud.push_back(sine(amplitude, 100.0, 20000));
@@ -75,12 +75,12 @@ TEST_CASE("nothing passes the ceiling, whatever comes", "[limiter]") {
     const auto out = limited(y);
     CHECK(peak(out) <= Limiter::ceiling);
     CHECK(std::all_of(out.begin(), out.end(), [](double s) { return std::isfinite(s); }));
-    // And it does not simply turn down; beyond 1e13 the gain has no digits left.
+    // The limiter does not just turn everything down. Beyond 1e13 the gain has no digits left.
     CHECK((peak(out) > 0.9 || peak(y) > 1e13));
   }
 }
 
-TEST_CASE("how the time is cut into blocks makes no difference", "[limiter]") {
+TEST_CASE("the block size makes no difference", "[limiter]") {
   Random random(3);
   std::vector<double> y(20000);
   double loudness = 0.5;
@@ -95,7 +95,7 @@ TEST_CASE("how the time is cut into blocks makes no difference", "[limiter]") {
   }
 }
 
-TEST_CASE("what is no number becomes silence, its neighbours stay", "[limiter]") {
+TEST_CASE("a NaN becomes silence and its neighbours are kept", "[limiter]") {
   std::vector<double> y(500, 0.25);
   y[100] = nan;
   y[101] = infinity;
@@ -106,8 +106,9 @@ TEST_CASE("what is no number becomes silence, its neighbours stay", "[limiter]")
   }
 }
 
-TEST_CASE("the gain moves without a step, down before the peak and slowly back", "[limiter]") {
-  // A carrier that stays and one peak of ten times the ceiling: the gain is the ratio of the two.
+TEST_CASE("the gain ramps down before the peak and recovers slowly", "[limiter]") {
+  // A constant carrier and one peak of ten times the ceiling: the gain is the ratio of output to
+  // input.
   std::vector<double> y(88200, 0.5);
   y[10000] = 10.0 * Limiter::ceiling;
   const auto out = limited(y);
@@ -116,21 +117,21 @@ TEST_CASE("the gain moves without a step, down before the peak and slowly back",
   for (std::size_t n = late; n < y.size(); ++n) {
     gain.push_back(out[n] / y[n - late]);
   }
-  // Down in a straight line over the 48 frames before: no step larger than 0.9/48.
+  // The gain falls linearly over the 48 frames before the peak, in steps of at most 0.9/48.
   INFO(show(largest_step(gain)));
   CHECK(largest_step(gain) <= 0.9 / static_cast<double>(late) * (1 + 1e-9));
   CHECK(gain[10000 - late - 1] == 1.0);
   CHECK(gain[10000] == Approx(0.1).epsilon(1e-12));
-  // Back as 1 - 0.9 exp(-t / 80 ms), the mean of the last 48 of it.
+  // It recovers as 1 - 0.9 exp(-t / 80 ms), averaged over 48 frames.
   CHECK(gain[10000 + 3528 + 24] == Approx(1.0 - 0.9 * std::exp(-1.0)).epsilon(0.002));
   for (std::size_t n = 10000 + 49; n < gain.size(); ++n) {
     REQUIRE(gain[n] >= gain[n - 1] - 1e-12);
   }
-  CHECK(gain.back() == 1.0);  // and in the end it is a pure delay again
+  CHECK(gain.back() == 1.0);  // in the end it is a pure delay again
 }
 
-TEST_CASE("the reduction is a share, however deep", "[limiter]") {
-  // One peak each: the gains of those before leave nothing in the later ones' but what they need.
+TEST_CASE("the reduction is exact at any depth", "[limiter]") {
+  // One peak per depth: earlier gains leave no error in later ones.
   for (const double amplitude : {1e3, 1e9, 1e15, 1e17, 1e18, 1e100, 1e300}) {
     Limiter limiter(44100.0);
     std::vector<double> y(20 * late, 0.0);

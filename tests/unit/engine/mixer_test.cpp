@@ -1,6 +1,6 @@
-// The loops over the voices of one kernel: every sum and peak is found here number by number, on
-// every instruction set, for blocks that fill packs and such that do not.
-#include "core/engine/mixing/mix.h"
+// The loops over the voices of one kernel. Sums and peaks are compared with scalar results, for
+// every instruction set, and for blocks with and without partial packs.
+#include "core/engine/mix.h"
 
 #include <limits>
 
@@ -25,7 +25,7 @@ void each_mixer(Use&& use) {
   }
 }
 
-// One voice, and as many lanes as one, two and five packs of 16 bytes have.
+// Numbers of voices: one, and the lanes of one, two and five packs of 16 bytes.
 template <class T>
 std::vector<std::size_t> widths() {
   constexpr std::size_t lanes = 16 / sizeof(T);
@@ -55,7 +55,7 @@ void each_shape(Use&& use) {
 
 }  // namespace
 
-TEST_CASE("silence is what has no number but 0 and -0", "[mixer]") {
+TEST_CASE("silence contains 0 and -0 only", "[mixer]") {
   each_mixer<double>([](const Mixer<double>& mixer) {
     for (std::size_t frames = 1; frames <= max_block_frames; ++frames) {
       std::vector<double> samples(frames, 0.0);
@@ -72,8 +72,8 @@ TEST_CASE("silence is what has no number but 0 and -0", "[mixer]") {
   });
 }
 
-TEMPLATE_TEST_CASE("a peak is the largest of a lane, and infinite beyond its bound", "[mixer]",
-                   double, float) {
+TEMPLATE_TEST_CASE("a peak is the largest magnitude of a lane, and infinite beyond its bound",
+                   "[mixer]", double, float) {
   using T = TestType;
   Random random(17);
   each_mixer<T>([&](const Mixer<T>& mixer) {
@@ -109,7 +109,7 @@ TEMPLATE_TEST_CASE("a peak is the largest of a lane, and infinite beyond its bou
   });
 }
 
-TEMPLATE_TEST_CASE("channels have the sum of all lanes, each with its gain", "[mixer]", double,
+TEMPLATE_TEST_CASE("channels receive the sum of all lanes times their gains", "[mixer]", double,
                    float) {
   using T = TestType;
   Random random(18);
@@ -120,7 +120,7 @@ TEMPLATE_TEST_CASE("channels have the sum of all lanes, each with its gain", "[m
       for (std::size_t lane = 0; lane < width; ++lane) {
         gain[lane] = lane % 3 == 1 ? T(0) : static_cast<T>(random.uniform(0.1, 1.0));
         for (std::size_t i = lane; i < y.size() && gain[lane] == T(0); i += width) {
-          y[i] = static_cast<T>(i % 2 == 0 ? no_number : infinity);  // is not heard
+          y[i] = static_cast<T>(i % 2 == 0 ? no_number : infinity);  // not heard
         }
       }
       std::vector<std::vector<double>> channels(outputs, std::vector<double>(frames, 0.5));
@@ -129,7 +129,7 @@ TEMPLATE_TEST_CASE("channels have the sum of all lanes, each with its gain", "[m
         pointers.push_back(channel.data());
       }
       mixer.add_voices({y.data(), frames, outputs, width, width}, gain.data(), pointers.data());
-      // So many sums of numbers below 1, each rounded by half of epsilon of at most the width.
+      // The tolerance is one rounding of half an epsilon per lane.
       constexpr double epsilon = std::numeric_limits<T>::epsilon();
       const double most = static_cast<double>(width * width + 2) * 0.5 * epsilon;
       std::size_t off = 0;
@@ -148,14 +148,14 @@ TEMPLATE_TEST_CASE("channels have the sum of all lanes, each with its gain", "[m
   });
 }
 
-TEMPLATE_TEST_CASE("nothing is mixed where a voice that is heard is beyond its bound", "[mixer]",
-                   double, float) {
+TEMPLATE_TEST_CASE("no lane is mixed if an audible voice is out of bounds", "[mixer]", double,
+                   float) {
   using T = TestType;
   constexpr std::size_t least = 16 / sizeof(T);
   Random random(19);
   each_mixer<T>([&](const Mixer<T>& mixer) {
     each_shape<T>([&](std::size_t frames, std::size_t outputs, std::size_t width) {
-      // Lanes behind those that are used may hold anything.
+      // Unused lanes may hold any values.
       const std::size_t used = width > least ? width - least : width;
       std::vector<T> y = random_rows<T>(random, frames * outputs * width);
       for (std::size_t i = 0; i < y.size(); ++i) {

@@ -1,6 +1,6 @@
-// MPE 1.0: zones, and notes that have a channel of their own.
+// MPE 1.0: zones, and notes with a channel of their own.
+#include "core/engine/keyboard.h"
 #include "core/engine/midi/channels.h"
-#include "core/engine/voices.h"
 #include "tests/support/pitch.h"
 #include "tests/support/player.h"
 
@@ -29,7 +29,7 @@ Event key_pressed(int channel, std::uint32_t frame, int key, double value) {
                       .value = value});
 }
 
-// The MPE configuration message, before all else.
+// Prepends the MPE configuration message.
 std::vector<Event> zone(int master, int members, std::vector<Event> then = {}) {
   std::vector<Event> events = {turned(master, 0, 101, 0), turned(master, 0, 100, 6),
                                turned(master, 0, 6, members)};
@@ -42,7 +42,7 @@ void make_zone(Channels& channels, int master, int members) {
   }
 }
 
-// Two hands: output 1 is where the first is, 2 the second, summed over the voices that are awake.
+// Two inputs. Outputs 1 and 2 are their positions, summed over all awake voices.
 const std::string hands =
     "@m mass 1. 0. 0.\n@g ground 0.\n@r springDamper @m @g 0.01 0.00001\n@in1 posInput 0.\n"
     "@in2 posInput 0.\n@k springDamper @in1 @m 0.001 0.\n@l springDamper @in2 @m 0.001 0.\n"
@@ -56,7 +56,8 @@ Preset expressive() {
   return preset;
 }
 
-// The last samples of both outputs. The voice that has no key yet sleeps before the first event.
+// Returns the last samples of both outputs. The initial voice without a key sleeps before the
+// events.
 std::vector<double> ends(const std::vector<Event>& events) {
   Player player(hands, expressive());
   player.run(40000);
@@ -67,7 +68,7 @@ std::vector<double> ends(const std::vector<Event>& events) {
 
 std::vector<double> heard(const std::vector<Event>& events,
                           const std::vector<std::size_t>& blocks = {256}) {
-  // In the direct form, which rounds alike however the time is cut into blocks.
+  // The direct form rounds the same at any block size.
   Player player(ringing_string(), struck(6), {.method = Method::direct});
   player.run(20000, events, blocks);
   CHECK(player.heap_calls == 0);
@@ -92,7 +93,8 @@ std::size_t first_difference(const std::vector<double>& a, const std::vector<dou
 
 }  // namespace
 
-TEST_CASE("a zone has its members, and the newer of two that overlap has the channels", "[mpe]") {
+TEST_CASE("a zone has its members, and the newer of two overlapping zones gets the channels",
+          "[mpe]") {
   Channels channels;
   const auto reach = [&](std::uint8_t c) { return channels.reach(c) & midi_channels; };
   const auto masters = [&] {
@@ -109,7 +111,7 @@ TEST_CASE("a zone has its members, and the newer of two that overlap has the cha
   CHECK(reach(15) == 0xf000);
   CHECK(reach(3) == 0x0008);
   CHECK(reach(8) == 0x0100);
-  make_zone(channels, 15, 12);  // leaves two to the lower one
+  make_zone(channels, 15, 12);  // leaves two members to the lower zone
   CHECK(reach(0) == 0x0007);
   CHECK(reach(15) == 0xfff8);
   make_zone(channels, 0, 14);  // leaves none
@@ -122,7 +124,7 @@ TEST_CASE("a zone has its members, and the newer of two that overlap has the cha
   make_zone(channels, 15, 15);
   CHECK(reach(15) == 0xffff);
   CHECK(reach(0) == 0x0001);
-  make_zone(channels, 7, 3);  // no master's channel
+  make_zone(channels, 7, 3);  // not a master channel
   CHECK(reach(15) == 0xffff);
   CHECK(reach(7) == 0x0080);
   make_zone(channels, 15, 0);
@@ -131,7 +133,7 @@ TEST_CASE("a zone has its members, and the newer of two that overlap has the cha
   }
 }
 
-TEST_CASE("bends reach 48 semitones on members and 2 on the master, together", "[mpe]") {
+TEST_CASE("bends add up to 48 semitones of the member and 2 of the master", "[mpe]") {
   Channels channels;
   make_zone(channels, 0, 7);
   channels.bend(1, 0.5);
@@ -140,7 +142,8 @@ TEST_CASE("bends reach 48 semitones on members and 2 on the master, together", "
   CHECK(channels.zone_semitones(1) == -2.0);
   CHECK(channels.zone_semitones(0) == 0.0);
   CHECK(channels.zone_semitones(9) == 0.0);
-  // What is said to one member is for all of them, and to the master for itself.
+  // A bend range sent to one member applies to all members; one sent to the master applies to
+  // itself.
   channels.turn(3, 101, 0.0);
   channels.turn(3, 100, 0.0);
   channels.turn(3, 6, 24.0 / 127.0);
@@ -153,7 +156,7 @@ TEST_CASE("bends reach 48 semitones on members and 2 on the master, together", "
   CHECK(channels.zone_semitones(1) == 0.0);
 }
 
-TEST_CASE("a member's bend moves its own note alone, in the frame that it names", "[mpe]") {
+TEST_CASE("a member's bend moves its own note alone, at the exact frame", "[mpe]") {
   const auto a = on(1, note_on(10, 60));
   const auto b = on(2, note_on(20, 64));
   const std::vector<double> both = heard(zone(0, 15, {a, b}));
@@ -163,7 +166,7 @@ TEST_CASE("a member's bend moves its own note alone, in the frame that it names"
     const std::vector<double> bent = heard(zone(0, 15, {a, b, bend(2, frame, 0.1)}));
     const std::vector<double> bent_b = heard(zone(0, 15, {b, bend(2, frame, 0.1)}));
     const std::size_t first = first_difference(bent, both);
-    // A sample of the force law, whatever the frame and however the time is cut into blocks.
+    // The change is one sample of the force law, at any frame and block size.
     CHECK(first - frame == late.value_or(first - frame));
     late = first - frame;
     CHECK(*late <= 2);
@@ -176,7 +179,7 @@ TEST_CASE("a member's bend moves its own note alone, in the frame that it names"
     CHECK(first_difference(heard(zone(0, 15, {a, b, bend(2, frame, 0.1)}), {64, 17, 512}), both) ==
           first);
   }
-  // The master's bends both, and a bend that came before the note is its own from the start.
+  // A master bend moves both notes. A member bend before the note applies from its start.
   const auto later = heard(zone(0, 15, {a, b, bend(0, 5000, 1.0)}));
   const auto alone = heard(zone(0, 15, {a, bend(0, 5000, 1.0)}));
   CHECK(apart(later, both, 5000) > 1e-3);
@@ -185,7 +188,7 @@ TEST_CASE("a member's bend moves its own note alone, in the frame that it names"
               heard(zone(0, 15, {on(1, note_on(10, 61))}))) < 1e-9);
 }
 
-TEST_CASE("pressure and slide move the inputs of their own note, to the frame", "[mpe]") {
+TEST_CASE("pressure and slide move the inputs of their own note at the exact frame", "[mpe]") {
   const auto two = [](std::vector<Event> then) {
     std::vector<Event> events = {on(1, note_on(0, 60)), on(2, note_on(0, 64))};
     events.insert(events.end(), then.begin(), then.end());
@@ -198,13 +201,13 @@ TEST_CASE("pressure and slide move the inputs of their own note, to the frame", 
   CHECK(ends(two({turned(2, 500, 74, 127)}))[1] == near(1.0));
   CHECK(ends(two({turned(2, 500, 74, 127)}))[0] == near(0.0));
   CHECK(ends(two({turned(3, 500, 74, 127)}))[1] == near(0.0));
-  CHECK(ends(two({turned(0, 500, 74, 127)}))[1] == near(2.0));  // the master's, of both
+  CHECK(ends(two({turned(0, 500, 74, 127)}))[1] == near(2.0));  // the master's, for both
   CHECK(ends(two({pressed(0, 500, 1.0)}))[0] == near(2.0));
-  // Key pressure is one key's, and nobody's where none sounds it.
+  // Key pressure applies to one key, and to none if no voice plays it.
   CHECK(ends(two({key_pressed(1, 500, 60, 1.0)}))[0] == near(1.0));
   CHECK(ends(two({key_pressed(1, 500, 64, 1.0)}))[0] == near(0.0));
   CHECK(ends(two({key_pressed(0, 500, 64, 1.0)}))[0] == near(1.0));
-  // A slide that came before the note is where it starts.
+  // A slide before the note sets its initial position.
   Player player(hands, expressive());
   player.run(2000, zone(0, 15, {turned(1, 0, 74, 127), on(1, note_on(1000, 60))}));
   CHECK(player.out[1][1001] == Approx(1.0));
@@ -224,7 +227,7 @@ TEST_CASE("pressure and slide move the inputs of their own note, to the frame", 
   }
 }
 
-TEST_CASE("without a zone pressure stays on its own channel and key, too", "[mpe]") {
+TEST_CASE("without a zone pressure stays on its own channel and key", "[mpe]") {
   const std::vector<Event> notes = {on(4, note_on(0, 60)), on(4, note_on(0, 64)),
                                     on(5, note_on(0, 67))};
   const auto with = [&](const Event& event) {
@@ -239,13 +242,13 @@ TEST_CASE("without a zone pressure stays on its own channel and key, too", "[mpe
   CHECK(with(key_pressed(5, 500, 64, 1.0)) == Approx(0.0).margin(1e-9));
 }
 
-TEST_CASE("a note that was let go keeps what its channel had said", "[mpe]") {
+TEST_CASE("a released note keeps the bend of its channel", "[mpe]") {
   const auto a = on(1, note_on(0, 60));
   const auto up = on(1, note_off(3000, 60));
   const std::vector<double> plain = heard(zone(0, 15, {a, up}));
   CHECK(apart(heard(zone(0, 15, {a, up, bend(1, 5000, 0.5)})), plain) == 0.0);
   CHECK(apart(heard(zone(0, 15, {a, bend(1, 2999, 0.5), up})), plain) > 1e-3);
-  // With the next note on the channel bent, the first is where it was; the master bends it still.
+  // The next note on the channel is bent, but the first keeps its pitch. The master still bends it.
   const auto b = on(1, note_on(5000, 64));
   const auto two = heard(zone(0, 15, {a, up, b, bend(1, 6000, 0.5)}));
   const auto only_b = heard(zone(0, 15, {b, bend(1, 6000, 0.5)}));
@@ -255,38 +258,37 @@ TEST_CASE("a note that was let go keeps what its channel had said", "[mpe]") {
   }
   CHECK(worst < 1e-12);
   CHECK(apart(heard(zone(0, 15, {a, up, bend(0, 5000, 1.0)})), plain) > 1e-3);
-  // In ordinary channels what rings on is bent, as on every synthesizer.
+  // On ordinary channels a ringing note is bent, as on every synthesizer.
   CHECK(apart(heard({on(1, note_on(0, 60)), up, bend(1, 5000, 0.5)}), heard({a, up})) > 1e-3);
-  // The same for hands.
+  // The same applies to inputs.
   CHECK(ends(zone(0, 15, {a, pressed(1, 100, 1.0), up, pressed(1, 5000, 0.0)}))[0] == Approx(1.0));
 }
 
-TEST_CASE("the master's pedals, levels and modes are for the whole zone", "[mpe]") {
+TEST_CASE("the master's pedals, levels and modes apply to the whole zone", "[mpe]") {
   Playing playing;
   playing.tuning = Tuning::keyboard;
   playing.voices = 4;
-  Voices voices(playing, 44100.0, 2);
+  Keyboard keyboard(playing, 44100.0, 2);
   for (const Event& event : zone(0, 3)) {
-    voices.turn(event.channel, event.index, event.value);
+    keyboard.turn_controller(event.channel, event.index, event.value);
   }
   constexpr double highest = 1e9;
-  voices.press_key(60, 1.0, 1, highest);
-  voices.press_key(62, 1.0, 2, highest);
-  voices.press_key(64, 1.0, 9, highest);
-  voices.turn(0, 64, 1.0);
-  CHECK(voices.press_key(65, 1.0, 1, highest) == Press::starts);
+  keyboard.press_key(60, 1.0, 1, highest);
+  keyboard.press_key(62, 1.0, 2, highest);
+  keyboard.press_key(64, 1.0, 9, highest);
+  keyboard.turn_controller(0, 64, 1.0);
+  CHECK(keyboard.press_key(65, 1.0, 1, highest) == Press::starts);
   int held = 0;
-  for (std::size_t lane = 0; lane < voices.size(); ++lane) {
-    Voice& voice = voices[lane];
+  for (Voice& voice : keyboard.voices) {
     const bool ends =
-        voice.held && voices.lift_key(voice, voice.key, voice.channel, usual_release_velocity);
+        voice.held && keyboard.release_key(voice, voice.key, voice.channel, usual_release_velocity);
     CHECK((!voice.has_key || ends == (voice.channel == 9)));
     held += voice.sustained ? 1 : 0;
   }
   CHECK(held == 3);
-  voices.turn(0, 64, 0.0);
-  for (std::size_t lane = 0; lane < voices.size(); ++lane) {
-    CHECK(voices.is_let_go(voices[lane], 0) == voices[lane].sustained);
+  keyboard.turn_controller(0, 64, 0.0);
+  for (const Voice& voice : keyboard.voices) {
+    CHECK(keyboard.is_released_by_pedal(voice, 0) == voice.sustained);
   }
   Channels channels;
   make_zone(channels, 0, 3);
@@ -296,8 +298,8 @@ TEST_CASE("the master's pedals, levels and modes are for the whole zone", "[mpe]
   CHECK(channels.level(2) == Approx(0.25));
   CHECK(channels.level(4) == Approx(1.0));
   CHECK(channels.softness(2) == Approx(0.75));
-  CHECK((channels.holds(3) && !channels.holds(4)));
-  // All of the zone, and nobody else, by modes.
+  CHECK((channels.latches(3) && !channels.latches(4)));
+  // Modes affect the whole zone and nothing else.
   const std::vector<Event> notes = {on(1, note_on(0, 60)), on(2, note_on(0, 64)),
                                     on(9, note_on(0, 67))};
   for (const int mode : {120, 123}) {
@@ -315,7 +317,7 @@ TEST_CASE("the master's pedals, levels and modes are for the whole zone", "[mpe]
   }
 }
 
-TEST_CASE("a new zone lets the notes of its channels go, and nobody else's", "[mpe]") {
+TEST_CASE("a new zone releases the notes of its channels and no others", "[mpe]") {
   Preset preset = struck(4);
   preset.damper_s = 0.01;
   const auto other = on(9, note_on(0, 67));
@@ -333,10 +335,11 @@ TEST_CASE("a new zone lets the notes of its channels go, and nobody else's", "[m
   CHECK(apart(player.y(), alone.y()) > 1e-3);
 }
 
-TEST_CASE("a note with an ID is bent, pressed and ended alone, and hears its instrument", "[mpe]") {
+TEST_CASE("a note with an ID is bent, pressed and ended alone, and follows its instrument",
+          "[mpe]") {
   const int first = note_channel(1);
   const int second = note_channel(2);
-  // As a member of an MPE zone, to the sample.
+  // It behaves like a member of an MPE zone, to the sample.
   const auto member = zone(0, 7, {on(1, note_on(100, 60)), bend(1, 4000, 0.125)});
   CHECK(heard({on(first, note_on(100, 60)), bend(first, 4000, 0.125)}) == heard(member));
   const auto both = [&](std::vector<Event> then) {
@@ -348,14 +351,14 @@ TEST_CASE("a note with an ID is bent, pressed and ended alone, and hears its ins
   CHECK(both({pressed(first, 100, 0.5)})[0] == Approx(0.5));
   CHECK(both({pressed(second, 100, 0.25), pressed(first, 100, 0.5)})[0] == Approx(0.75));
   CHECK(both({turned(second, 100, 74, 127)})[1] == Approx(1.0));
-  // The instrument's channel is for all of them.
+  // The instrument's channel applies to all of them.
   CHECK(both({pressed(0, 100, 0.5)})[0] == Approx(1.0));
   CHECK(heard({on(first, note_on(0, 60)), turned(0, 3000, 7, 0)}) ==
         heard({note_on(0, 60), turned(0, 3000, 7, 0)}));
-  // The other plays on.
+  // The other note keeps playing.
   CHECK(heard({on(first, note_on(0, 60)), turned(second, 3000, 123, 0)}) ==
         heard({on(first, note_on(0, 60))}));
-  // What a zone is told is not for notes with an ID.
+  // Zone messages do not affect notes with an ID.
   Channels channels;
   make_zone(channels, 0, 15);
   channels.bend(static_cast<std::uint8_t>(first), 0.25);
@@ -365,7 +368,7 @@ TEST_CASE("a note with an ID is bent, pressed and ended alone, and hears its ins
   CHECK(channels.semitones(static_cast<std::uint8_t>(first)) == 12.0);
 }
 
-TEST_CASE("a note has the frequency that it says, and no retuned key moves it", "[mpe]") {
+TEST_CASE("a note keeps its own frequency when its key is retuned", "[mpe]") {
   constexpr double rate_hz = 44100.0;
   Preset preset = struck(2);
   preset.transpose = -12;

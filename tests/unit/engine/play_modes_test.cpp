@@ -1,6 +1,6 @@
-// Which voice plays which key: one a key, one for all, legato, pedals, glides. The cases are those
-// that a voice manager is asked for.
-#include "core/engine/voices.h"
+// The assignment of voices to keys: poly, mono, legato, pedals and glides. The cases are those that
+// any voice manager must handle.
+#include "core/engine/keyboard.h"
 #include "tests/support/pitch.h"
 #include "tests/support/player.h"
 
@@ -12,7 +12,7 @@ using namespace support;
 constexpr double rate_hz = 44100.0;
 constexpr double highest = 1e9;
 
-// Voices and what an engine does with them when keys and pedals move; what is let go rings on.
+// A keyboard whose released voices ring on, and the calls that an engine makes for keys and pedals.
 struct Keys {
   explicit Keys(int count, bool mono = false, bool legato = false, double glide_s = 0.0) {
     playing.tuning = Tuning::keyboard;
@@ -20,38 +20,39 @@ struct Keys {
     playing.mono = mono;
     playing.legato = legato;
     playing.glide_s = glide_s;
-    voices.emplace(playing, rate_hz, std::size_t{2});
+    keyboard.emplace(playing, rate_hz, std::size_t{2});
   }
   Press on(int key, int channel = 0) {
-    return voices->press_key(key, 0.8, static_cast<std::uint8_t>(channel), highest);
+    return keyboard->press_key(key, 0.8, static_cast<std::uint8_t>(channel), highest);
   }
-  // The key that it goes back to.
+  // Releases a key. Returns the held key to which the voice returns.
   std::optional<int> off(int key, int channel = 0) {
-    if (const auto earlier = voices->go_back(key, static_cast<std::uint8_t>(channel), highest)) {
+    if (const auto earlier =
+            keyboard->return_to_held_key(key, static_cast<std::uint8_t>(channel), highest)) {
       return earlier->key;
     }
-    for (std::size_t lane = 0; lane < voices->size(); ++lane) {
-      Voice& voice = (*voices)[lane];
-      if (voices->lift_key(voice, key, static_cast<std::uint8_t>(channel),
-                           usual_release_velocity)) {
-        voices->release(voice);
+    for (Voice& voice : keyboard->voices) {
+      if (keyboard->release_key(voice, key, static_cast<std::uint8_t>(channel),
+                                usual_release_velocity)) {
+        keyboard->release(voice);
       }
     }
     return std::nullopt;
   }
   void pedal(bool is_down, int channel = 0) {
-    voices->turn(static_cast<std::uint8_t>(channel), 64, is_down ? 1.0 : 0.0);
-    for (std::size_t lane = 0; lane < voices->size(); ++lane) {
-      if (voices->is_let_go((*voices)[lane], static_cast<std::uint8_t>(channel))) {
-        voices->release((*voices)[lane]);
+    keyboard->turn_controller(static_cast<std::uint8_t>(channel), 64, is_down ? 1.0 : 0.0);
+    for (Voice& voice : keyboard->voices) {
+      if (keyboard->is_released_by_pedal(voice, static_cast<std::uint8_t>(channel))) {
+        keyboard->release(voice);
       }
     }
   }
+  const Voice& latest() const { return keyboard->voices[keyboard->voices.latest()]; }
   template <class Wanted>
   int count(Wanted&& wanted) const {
     int found = 0;
-    for (std::size_t lane = 0; lane < voices->size(); ++lane) {
-      const Voice& voice = (*voices)[lane];
+    for (std::size_t lane = 0; lane < keyboard->voices.size(); ++lane) {
+      const Voice& voice = keyboard->voices[lane];
       found += voice.is_live() && voice.has_key && wanted(voice) ? 1 : 0;
     }
     return found;
@@ -70,12 +71,12 @@ struct Keys {
   }
 
   Playing playing;
-  std::optional<Voices> voices;
+  std::optional<Keyboard> keyboard;
 };
 
 }  // namespace
 
-TEST_CASE("each key has a voice, and channels have their own", "[play_modes]") {
+TEST_CASE("each key has its own voice, separately for each channel", "[play_modes]") {
   Keys keys(8);
   CHECK(keys.on(60) == Press::starts);
   CHECK(keys.on(64) == Press::starts);
@@ -84,33 +85,33 @@ TEST_CASE("each key has a voice, and channels have their own", "[play_modes]") {
   CHECK((keys.live() == 3 && keys.on_key(60) == 2));
   keys.off(60, 1);
   CHECK(keys.gated() == 2);
-  keys.off(60, 5);  // nobody's
+  keys.off(60, 5);  // matches no voice
   keys.off(61);
   CHECK(keys.gated() == 2);
   keys.off(60);
   keys.off(64);
-  CHECK((keys.gated() == 0 && keys.live() == 3));  // and all ring on
+  CHECK((keys.gated() == 0 && keys.live() == 3));  // and all of them ring on
 }
 
-TEST_CASE("a key that sounds is struck again in its own voice", "[play_modes]") {
+TEST_CASE("a sounding key is struck again in its own voice", "[play_modes]") {
   Keys keys(4);
   for (const int key : {60, 61, 62, 63}) {
     keys.on(key);
   }
   keys.off(60);
   CHECK((keys.live() == 4 && keys.gated() == 3));
-  // In a full house too: nobody gives way.
+  // No voice is stolen even if all are in use.
   CHECK(keys.on(60) == Press::strikes);
   CHECK((keys.live() == 4 && keys.gated() == 4));
   for (const int key : {60, 61, 62, 63}) {
     CHECK(keys.on_key(key) == 1);
   }
-  // A new key takes one place, no more.
+  // A new key steals exactly one voice.
   CHECK(keys.on(64) == Press::starts);
   CHECK((keys.live() == 4 && keys.on_key(64) == 1));
 }
 
-TEST_CASE("the sustain pedal holds notes, struck again or not, until it goes up", "[play_modes]") {
+TEST_CASE("the sustain pedal holds notes, repeated or not, until it is lifted", "[play_modes]") {
   Keys keys(8);
   keys.on(60);
   keys.on(64);
@@ -121,7 +122,7 @@ TEST_CASE("the sustain pedal holds notes, struck again or not, until it goes up"
   CHECK(keys.sounding() == 1);  // 64 is still down
   keys.off(64);
   CHECK(keys.sounding() == 0);
-  // Struck again under the pedal, and released under it...
+  // A key repeated and released under the pedal...
   keys.pedal(true);
   keys.on(60);
   keys.off(60);
@@ -130,7 +131,7 @@ TEST_CASE("the sustain pedal holds notes, struck again or not, until it goes up"
   CHECK((keys.sounding() == 1 && keys.on_key(60) == 1));
   keys.pedal(false);
   CHECK(keys.sounding() == 0);
-  // ...or after it.
+  // ...or released after it.
   keys.pedal(true);
   keys.on(60);
   keys.off(60);
@@ -139,41 +140,41 @@ TEST_CASE("the sustain pedal holds notes, struck again or not, until it goes up"
   CHECK(keys.sounding() == 1);
   keys.off(60);
   CHECK(keys.sounding() == 0);
-  // Another channel's pedal is none of its business.
+  // A pedal on another channel has no effect.
   keys.pedal(true, 3);
   keys.on(60);
   keys.off(60);
   CHECK(keys.sounding() == 0);
 }
 
-TEST_CASE("mono plays the last of the keys that are down, in one voice", "[play_modes]") {
+TEST_CASE("mono plays the latest held key in one voice", "[play_modes]") {
   Keys keys(8, true);
   CHECK(keys.on(60) == Press::starts);
   CHECK(keys.on(64) == Press::strikes);
   CHECK((keys.live() == 1 && keys.on_key(64) == 1));
   CHECK(keys.on(67) == Press::strikes);
-  CHECK(keys.off(64) == std::nullopt);  // not the one that sounds
+  CHECK(keys.off(64) == std::nullopt);  // not the sounding key
   CHECK((keys.gated() == 1 && keys.on_key(67) == 1));
   CHECK(keys.off(67) == 60);
   CHECK((keys.gated() == 1 && keys.on_key(60) == 1));
   CHECK(keys.off(60) == std::nullopt);
   CHECK(keys.gated() == 0);
-  // What rings is taken up again.
+  // A ringing voice is played again.
   CHECK(keys.on(62) == Press::strikes);
   CHECK(keys.live() == 1);
-  // A channel each.
+  // Each channel has its own voice.
   CHECK(keys.on(62, 1) == Press::starts);
   CHECK(keys.live() == 2);
   CHECK(keys.off(62, 1) == std::nullopt);
   CHECK(keys.gated() == 1);
-  // Of the same key twice one release is enough.
+  // One release is enough for two presses of the same key.
   keys.on(62);
   keys.on(62);
   keys.off(62);
   CHECK(keys.gated() == 0);
 }
 
-TEST_CASE("in mono a pedal holds what sounds, and keys say what that is", "[play_modes]") {
+TEST_CASE("in mono a pedal holds the sound, and keys set its pitch", "[play_modes]") {
   Keys keys(8, true);
   keys.pedal(true);
   keys.on(60);
@@ -197,30 +198,30 @@ TEST_CASE("legato moves without a new blow while a key is down", "[play_modes]")
   CHECK(keys.gated() == 1);
   CHECK(keys.off(62) == std::nullopt);
   CHECK(keys.gated() == 0);
-  CHECK(keys.on(64) == Press::strikes);  // the voice that rings, struck anew
+  CHECK(keys.on(64) == Press::strikes);  // the ringing voice, struck again
   CHECK(keys.live() == 1);
   CHECK(keys.on(65) == Press::moves);
   CHECK(keys.off(65) == 64);
   CHECK(keys.off(64) == std::nullopt);
-  // By the switch, of a channel that plays mono; each for itself.
+  // The legato switch works on a mono channel, separately for each channel.
   Keys switched(8, true);
-  switched.voices->turn(0, 68, 1.0);
+  switched.keyboard->turn_controller(0, 68, 1.0);
   switched.on(60);
   CHECK(switched.on(62) == Press::moves);
   switched.on(60, 1);
   CHECK(switched.on(62, 1) == Press::strikes);
 }
 
-TEST_CASE("channel modes say mono and poly whatever the preset says", "[play_modes]") {
+TEST_CASE("channel modes select mono and poly regardless of the preset", "[play_modes]") {
   Keys keys(8);
-  keys.voices->set_mono(2, true);
+  keys.keyboard->set_mono(2, true);
   keys.on(60, 2);
   CHECK(keys.on(64, 2) == Press::strikes);
   CHECK(keys.live() == 1);
   keys.on(60);
   CHECK(keys.on(64) == Press::starts);
   Keys mono(8, true);
-  mono.voices->set_mono(0, false);
+  mono.keyboard->set_mono(0, false);
   mono.on(60);
   CHECK(mono.on(64) == Press::starts);
 }
@@ -231,43 +232,44 @@ TEST_CASE("a glide takes its time and ends on the pitch", "[play_modes]") {
   Keys keys(8, true, true, glide_s);
   keys.on(60);
   keys.on(72);
-  const Voice& voice = (*keys.voices)[keys.voices->last()];
+  const Voice& voice = keys.latest();
   CHECK(voice.glide == Approx(-12.0).epsilon(1e-12));
   for (int i = 0; i < updates / 2; ++i) {
-    keys.voices->glide_on();
+    keys.keyboard->voices.advance_glides();
   }
   CHECK(voice.glide == Approx(-6.0).margin(12.0 / updates));
-  // Back from the midst of it.
+  // It can turn back halfway.
   keys.off(72);
   CHECK(voice.glide == Approx(6.0).margin(12.0 / updates));
   for (int i = 0; i <= updates; ++i) {
-    keys.voices->glide_on();
+    keys.keyboard->voices.advance_glides();
   }
   CHECK(voice.glide == 0.0);
   CHECK(voice.frequency_hz == Approx(261.6255653005986).epsilon(1e-12));
-  // Legato glides where keys overlap only; poly from the key before, on its own channel.
+  // Legato glides only if keys overlap. Poly glides from the previous key of its own channel.
   keys.off(60);
   keys.on(67);
-  CHECK((*keys.voices)[keys.voices->last()].glide == 0.0);
+  CHECK(keys.latest().glide == 0.0);
   Keys poly(8, false, false, glide_s);
   poly.on(60);
-  CHECK((*poly.voices)[poly.voices->last()].glide == 0.0);
+  CHECK(poly.latest().glide == 0.0);
   poly.on(67);
-  CHECK((*poly.voices)[poly.voices->last()].glide == Approx(-7.0));
+  CHECK(poly.latest().glide == Approx(-7.0));
   poly.on(67, 1);
-  CHECK((*poly.voices)[poly.voices->last()].glide == 0.0);
-  // Controller 65 ends it, 5 says how long: a quarter of 4 s for half of 127.
-  poly.voices->turn(0, 65, 0.0);
+  CHECK(poly.latest().glide == 0.0);
+  // Controller 65 switches it off, and controller 5 sets the time: a quarter of 4 s at half its
+  // range.
+  poly.keyboard->turn_controller(0, 65, 0.0);
   poly.on(70);
-  CHECK((*poly.voices)[poly.voices->last()].glide == 0.0);
-  poly.voices->turn(0, 65, 1.0);
-  poly.voices->turn(0, 5, 0.5);
+  CHECK(poly.latest().glide == 0.0);
+  poly.keyboard->turn_controller(0, 65, 1.0);
+  poly.keyboard->turn_controller(0, 5, 0.5);
   poly.on(71);
-  const Voice& slow = (*poly.voices)[poly.voices->last()];
+  const Voice& slow = poly.latest();
   CHECK(slow.glide_step == Approx(1.0 * max_block_frames / rate_hz).epsilon(1e-9));
 }
 
-TEST_CASE("a glide is heard, and one voice is struck again or moved", "[play_modes]") {
+TEST_CASE("a glide is audible, and a mono voice is struck again or moved", "[play_modes]") {
   const auto played = [](bool legato, double glide_s) {
     Preset preset = struck(4);
     preset.mono = true;
@@ -306,7 +308,7 @@ TEST_CASE("channels that a preset does not listen to play nothing", "[play_modes
   CHECK(played(0, 0x0008) == 0.0);
 }
 
-TEST_CASE("a velocity curve bends the touch and keeps its ends", "[play_modes]") {
+TEST_CASE("a velocity curve shapes the touch and keeps its end points", "[play_modes]") {
   const auto loudness = [](double curve, double velocity,
                            std::vector<std::array<double, 2>> points = {}, bool is_soft = false) {
     Preset preset = struck(4);
@@ -318,7 +320,7 @@ TEST_CASE("a velocity curve bends the touch and keeps its ends", "[play_modes]")
     return peak(player.y());
   };
   const double full = loudness(0.0, 1.0);
-  // The blow is in proportion to what the curve gives: v, its square root, its square.
+  // The blow is proportional to the curve's value: v, its square root, its square.
   CHECK(loudness(0.0, 0.25) == Approx(0.25 * full));
   CHECK(loudness(0.5, 0.25) == Approx(0.5 * full));
   CHECK(loudness(-0.5, 0.25) == Approx(0.0625 * full));
@@ -328,12 +330,12 @@ TEST_CASE("a velocity curve bends the touch and keeps its ends", "[play_modes]")
   CHECK(loudness(0.0, 0.25, points) == Approx(0.3 * full));
   CHECK(loudness(0.0, 0.75, points) == Approx(0.6 * full));
   CHECK(loudness(0.0, 1.0, points) == Approx(0.8 * full));
-  // Three quarters of the touch, not of what the curve gives for it: 0.6^2 and not 0.75 0.8^2.
+  // The soft pedal scales the velocity, not the curve's value: 0.6^2 and not 0.75 0.8^2.
   CHECK(loudness(-0.5, 0.8, {}, true) == Approx(0.36 * full));
   CHECK(loudness(0.0, 1.0, points, true) == Approx(0.6 * full));
 }
 
-TEST_CASE("a mode that is not there is no pitch, and that is told", "[play_modes]") {
+TEST_CASE("a pitch mode that does not exist is reported", "[play_modes]") {
   Preset preset = struck(1);
   preset.pitch_mode = 2;
   const auto made = compile_network(
@@ -344,27 +346,27 @@ TEST_CASE("a mode that is not there is no pitch, and that is told", "[play_modes
   CHECK(made->plan.notes[0] == "keys do not set the pitch: there is no mode 2");
 }
 
-TEST_CASE("a preset names the mode that is its pitch", "[play_modes]") {
+TEST_CASE("a preset names the mode that sets its pitch", "[play_modes]") {
   for (const int number : {1, 2, 3, 5, 8}) {
     Preset preset = struck(1);
     preset.pitch_mode = number;
     Player player(ringing_string(), preset);
     player.run(60000, {note_on(0, 69)});
-    // Of eleven equal springs: mode n at 2 sqrt(K) sin(n pi / 22).
+    // Eleven equal springs: mode n has the frequency 2 sqrt(K) sin(n pi / 22).
     const double shape = std::sin(number * std::numbers::pi / 22.0);
     const double first_hz = 440.0 * std::sin(std::numbers::pi / 22.0) / shape;
     const std::span<const double> late = std::span(player.y()).subspan(4000);
     CAPTURE(number);
     CHECK(1200.0 * std::log2(measured_hz(late, rate_hz, first_hz) / first_hz) ==
-          Approx(0.0).margin(1.0));  // the scheme's own dispersion between both
-    if (number != 8) {               // which is over by then
+          Approx(0.0).margin(1.0));  // dispersion of the scheme between the two
+    if (number != 8) {               // which has decayed by then
       CHECK(1200.0 * std::log2(measured_hz(late, rate_hz, 440.0) / 440.0) ==
             Approx(0.0).margin(0.05));
     }
   }
 }
 
-TEST_CASE("what a sound is flat of its mode is made up for by points of keys", "[play_modes]") {
+TEST_CASE("tuning points by key compensate a sound that is flat of its mode", "[play_modes]") {
   Preset preset = struck(1);
   preset.transpose = -12;
   preset.flattening_cents = {{60.0, 10.0}, {72.0, 40.0}};

@@ -1,4 +1,4 @@
-// Several engines that play the voices of one instrument in turn: together they are one.
+// Several engines that share the notes of one instrument play the same as one engine.
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -11,7 +11,8 @@ namespace ressort::share_test {
 
 namespace {
 
-// 60 notes, two at a time. Bodies that are plucked tell from which side: they get each key once.
+// 60 notes, two at a time. A plucked body remembers the side of the finger, so it gets each key
+// once.
 std::vector<double> played(const Scene& scene, NoteShare::Part share, bool with_panic,
                            bool is_plucked) {
   auto compiled = compile_network(scene.network, scene.preset,
@@ -31,7 +32,7 @@ std::vector<double> played(const Scene& scene, NoteShare::Part share, bool with_
       return static_cast<std::uint16_t>(is_plucked ? 36 + at : 45 + at * 7 % 24);
     };
     const std::uint16_t key = key_at(step);
-    if (step % 2 == 0) {  // keys come again while they ring, and two at a time
+    if (step % 2 == 0) {  // keys are repeated while they ring, two at a time
       events.push_back({.kind = EventKind::note_on, .index = key, .value = 0.7});
       events.push_back({.frame = 100,
                         .kind = EventKind::note_on,
@@ -99,20 +100,22 @@ TEST_CASE("two and three engines that share the notes sum up to one", "[share]")
   }
 }
 
-TEST_CASE("new keys go round, and a key stays where it was", "[share]") {
+TEST_CASE("new keys alternate between engines, and a repeated key stays with its engine",
+          "[share]") {
   NoteShare first({1, 2});
   NoteShare second({2, 2});
   const auto takers = [&](std::uint8_t channel, std::size_t key) {
-    return std::pair(first.takes(channel, key), second.takes(channel, key));
+    return std::pair(first.owns(channel, key), second.owns(channel, key));
   };
   CHECK(takers(0, 60) == std::pair(true, false));
   CHECK(takers(0, 64) == std::pair(false, true));
   CHECK(takers(0, 67) == std::pair(true, false));
-  CHECK(takers(1, 60) == std::pair(false, true));  // another channel's is another key
+  CHECK(takers(1, 60) ==
+        std::pair(false, true));  // the same key on another channel counts as another key
   CHECK(takers(0, 64) == std::pair(false, true));
   CHECK(takers(0, 60) == std::pair(true, false));
-  first.begin_anew();
-  second.begin_anew();
+  first.restart();
+  second.restart();
   CHECK(takers(0, 64) == std::pair(true, false));
 }
 

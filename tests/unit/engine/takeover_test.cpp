@@ -1,4 +1,4 @@
-// One engine goes on where another of the same model is, in other forms, and nobody hears it.
+// An engine takes over the state of another one of the same model in other forms, inaudibly.
 #include <unistd.h>
 
 #include <filesystem>
@@ -14,7 +14,7 @@ namespace {
 using support::Player;
 using support::show;
 
-// A string of masses on oscillators, with gravity, a contact and two inputs: all that has to go on.
+// A string of masses on oscillators, with gravity, a contact and two inputs: all kinds of state.
 const std::string body =
     scenes::string("s", 12, "0.1", "0.002") +
     "@o osc 1. 0.02 0.001 0.01 0.01\n@h springDamper @o @s_m3 s_K 0.001\n"
@@ -43,7 +43,7 @@ const std::vector<Event> beginning = {support::note_on(0, 57), support::note_on(
 const std::vector<Event> ending = {support::note_on(300, 69), support::note_off(500, 57),
                                    support::controller(900, 1, 0.1)};
 
-// How far the second half is from that of an engine that was not relieved.
+// Returns the difference of the second half from an engine that was not replaced.
 double difference(const std::string& text, const Preset& preset, int stiffness, Method from,
                   Method to, Precision precision = Precision::float64) {
   std::vector<Event> events = beginning;
@@ -52,10 +52,10 @@ double difference(const std::string& text, const Preset& preset, int stiffness, 
   Player leaves(text, preset, in_form(from, precision));
   Player comes(text, preset, in_form(to, precision));
   for (Player* player : {&stays, &leaves}) {
-    player->run(2000, events, {64, 100, 17});  // in the midst of the stiffness's ramp
+    player->run(2000, events, {64, 100, 17});  // in the middle of the stiffness ramp
   }
   const support::HeapWatch watch;
-  const bool goes_on = comes.engine().go_on_from(leaves.engine());
+  const bool goes_on = comes.engine().continue_from(leaves.engine());
   const std::size_t heap_calls = watch.calls();
   REQUIRE(goes_on);
   CHECK(heap_calls == 0);
@@ -68,13 +68,13 @@ double difference(const std::string& text, const Preset& preset, int stiffness, 
   return worst / support::peak({stays.y().data() + 2000, 4000});
 }
 
-// A kernel that the part does not have would be the direct one under another name.
+// Skips kernels that the part does not have, because they would be the direct one.
 bool has_form(const std::string& text, Method method) {
   const Machine machine = make_machine(support::network_of(text), 48000.0, true);
   return make_plan(machine, {}, method).parts[0].method == method;
 }
 
-TEST_CASE("An engine goes on where another is", "[takeover]") {
+TEST_CASE("An engine continues from the state of another", "[takeover]") {
   const std::string mesh = scenes::square_mesh("mesh", 10, 8, "0.1", "0.01") +
                            "@in1 frcInput @mesh_m2_6\n@in2 posInput 0.\n"
                            "@p springDamper @in2 @mesh_m5_5 mesh_K mesh_Z\n" +
@@ -103,29 +103,29 @@ TEST_CASE("An engine goes on where another is", "[takeover]") {
   CHECK(reached.size() == methods_for(KernelRow::Use::published).size());
 }
 
-TEST_CASE("Modes cannot tell where all masses are", "[takeover]") {
+TEST_CASE("A modal form cannot reconstruct all masses", "[takeover]") {
   Player modal(support::ringing_string(), support::struck(1), in_form(Method::modal));
   Player direct(support::ringing_string(), support::struck(1), in_form(Method::direct));
   modal.run(500, {support::note_on(0, 57)});
-  CHECK_FALSE(direct.engine().go_on_from(modal.engine()));
+  CHECK_FALSE(direct.engine().continue_from(modal.engine()));
   direct.run(500);
   CHECK(support::peak(direct.y()) == 0.0);
 }
 
-TEST_CASE("A damper that takes all velocity in one sample lets nobody go on", "[takeover]") {
+TEST_CASE("A damper that takes all velocity in one sample prevents a takeover", "[takeover]") {
   const std::string text = "@c osc 1. 0.5 " + std::to_string(48000.0 / 44100.0) +
                            " 0. 0.\n@m osc 2. 0.05 0.01 0. 0.\n@l springDamper @c @m 0.02 0.\n"
                            "@in1 frcInput @m\n@out1 posOutput @c\n";
   Player direct(text, support::struck(1), in_form(Method::direct));
   Player modal(text, support::struck(1), in_form(Method::modal));
   direct.run(500, {support::note_on(0, 57)});
-  CHECK_FALSE(modal.engine().go_on_from(direct.engine()));
+  CHECK_FALSE(modal.engine().continue_from(direct.engine()));
   modal.run(500, {support::note_on(0, 57)});
   CHECK(std::isfinite(support::peak(modal.y())));
   CHECK(support::peak(modal.y()) > 0.0);
 }
 
-// One callback of 64 frames, in which a key may be struck.
+// Plays one callback of 64 frames, in which a key may be struck.
 std::vector<double> listen(Process& process, bool strikes) {
   std::vector<double> left(64);
   std::vector<double*> outputs{left.data()};
@@ -136,10 +136,10 @@ std::vector<double> listen(Process& process, bool strikes) {
   return left;
 }
 
-TEST_CASE("A large mesh sounds at once, and by its modes when they are found", "[takeover]") {
+TEST_CASE("A large mesh sounds at once, and by modes as soon as they are found", "[takeover]") {
   const std::string name = "ressort-takeover-" + std::to_string(getpid());
   const std::string path = (std::filesystem::temp_directory_path() / name).string();
-  // Keys as low as these need no exact modes: both forms are the published scheme.
+  // Keys as low as these need no exact modes, so both forms are the published scheme.
   const std::string text = "model = \"" + name +
                            ".mdl\"\ngain = 8.8\nvoices = 2\n[[control]]\nfrom = \"note\"\n"
                            "to = \"in1\"\nhow = \"impulse\"\nkeys = [0, 50]\n";

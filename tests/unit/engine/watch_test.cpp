@@ -1,5 +1,5 @@
-// What an engine tells of its voices' energy, whom it does not accuse, and that those who sleep are
-// taken over asleep.
+// An engine's energy readings, stable models that must not be reported as unstable, and takeovers
+// of sleeping voices.
 #include <memory>
 
 #include "app/session/loader.h"
@@ -25,9 +25,9 @@ Player struck_mass(double stiffness, double damping, double rate_hz) {
   return player;
 }
 
-// --- the meter ----------------------------------------------------------------------------------
+// --- meters -------------------------------------------------------------------------------------
 
-TEST_CASE("The meter reads what a blow has given, at every rate", "[watch]") {
+TEST_CASE("The meter reads the energy of a blow at every rate", "[watch]") {
   for (const double rate_hz : {44100.0, 48000.0, 96000.0}) {
     Player player = struck_mass(0.01, 0.0, rate_hz);
     player.run(4 * 8192);
@@ -35,13 +35,14 @@ TEST_CASE("The meter reads what a blow has given, at every rate", "[watch]") {
     INFO(rate_hz << " " << show(now.energy) << " " << show(now.loss));
     CHECK(now.is_whole);
     CHECK_FALSE(now.is_driven);
-    // 1/2 p v, v half of that of the sample after the blow: within the share of a sample's turn.
+    // The energy is 1/2 p v, with half the velocity after the blow; the tolerance is one sample's
+    // phase.
     CHECK(now.energy == Approx(0.5 * 0.1 * 0.1).epsilon(0.01));
     CHECK(std::fabs(now.loss) < 1e-9 * now.energy * rate_hz);
   }
 }
 
-TEST_CASE("The loss is what the dampers take", "[watch]") {
+TEST_CASE("The loss is the power of the dampers", "[watch]") {
   constexpr double damping = 2e-5;
   Player player = struck_mass(0.01, damping, 44100.0);
   player.run(2 * 8192);
@@ -49,7 +50,7 @@ TEST_CASE("The loss is what the dampers take", "[watch]") {
   for (int look = 0; look < 5; ++look) {
     player.run(8192);
     const EngineMeters now = player.engine().meters();
-    // Half of the energy moves, on the average: E falls as exp(-Z n).
+    // Half of the energy is kinetic on average, so E falls as exp(-Z n).
     const double within = 44100.0 * (std::exp(damping * 4096.0) - 1.0) / 4096.0;
     INFO(show(now.energy) << ", " << show(now.loss / now.energy) << " of " << show(within));
     CHECK_FALSE(now.is_driven);
@@ -59,7 +60,7 @@ TEST_CASE("The loss is what the dampers take", "[watch]") {
   }
 }
 
-TEST_CASE("While a hand moves nobody knows what is lost", "[watch]") {
+TEST_CASE("The loss is unknown while an input is driven", "[watch]") {
   Player player = struck_mass(0.01, 0.0, 44100.0);
   player.run(16384);
   CHECK_FALSE(player.engine().meters().is_driven);
@@ -97,7 +98,7 @@ TEST_CASE("A large part's energy is added up in slices", "[watch]") {
     }
     CHECK(std::fabs(sum.value - whole) < 1e-12 * whole);
   }
-  // And an engine does so in blocks that go on meanwhile: without dampers nothing is lost.
+  // An engine does so while blocks are played. Without dampers there is no loss.
   const std::string drum = scenes::square_mesh("m", 100, 100, "0.1", "0.") +
                            "@in1 frcInput @m_m20_30\n" + scenes::output(1, "m_m7_3");
   support::Bare<double> bare(support::program_of(drum));
@@ -121,9 +122,9 @@ TEST_CASE("A large part's energy is added up in slices", "[watch]") {
   CHECK(std::fabs(now.loss) < 1e-9 * given);
 }
 
-// --- who sleeps altogether ----------------------------------------------------------------------
+// --- sleep --------------------------------------------------------------------------------------
 
-TEST_CASE("When sleep ends does not depend on how time is cut", "[watch]") {
+TEST_CASE("The end of sleep does not depend on the block size", "[watch]") {
   const bool has_noise = GENERATE(false, true);
   Preset preset = support::struck(1);
   preset.noise = has_noise;
@@ -136,7 +137,7 @@ TEST_CASE("When sleep ends does not depend on how time is cut", "[watch]") {
   audio[100037] = audio[150129] = 1.0;
   const std::vector<const double*> inputs = {audio.data()};
   const std::vector<Event> events = {support::note_on(3, 57), support::note_off(2000, 57)};
-  Player whole(text, preset, {.method = Method::direct});  // to the last bit
+  Player whole(text, preset, {.method = Method::direct});  // exact to the last bit
   Player cut(text, preset, {.method = Method::direct});
   whole.run(90000, events, {4096}, inputs);
   CHECK(whole.engine().meters().saved == 1.0);
@@ -155,10 +156,10 @@ TEST_CASE("When sleep ends does not depend on how time is cut", "[watch]") {
   CHECK(std::equal(whole.y().begin(), whole.y().end(), cut.y().begin(), cut.y().end()));
 }
 
-// --- who never stands still ---------------------------------------------------------------------
+// --- parts that are never frozen ----------------------------------------------------------------
 
-// As the program does it: with a gain of its own, keys, and the wheel.
-TEST_CASE("What has no bound at rest is played", "[watch]") {
+// Runs the model as the program does, with its own gain, keys and the modulation wheel.
+TEST_CASE("A part without a rest bound is always stepped", "[watch]") {
   struct Case {
     std::string name;
     std::string text;
@@ -204,17 +205,16 @@ TEST_CASE("What has no bound at rest is played", "[watch]") {
   }
 }
 
-// --- who does not run away
-// -------------------------------------------------------------------------
+// --- stable instruments -------------------------------------------------------------------------
 
-TEST_CASE("Nobody in the instruments runs away", "[watch]") {
+TEST_CASE("No shipped instrument is reported as unstable", "[watch]") {
   const std::string folder = std::string(RESSORT_SOURCE) + "/presets/";
   for (const std::string name :
        {"1000massString", "20x30mesh", "BowedString", "IPlayTheTriangle", "LargeTriangleMesh",
         "PhysicalLFO", "PluckedHarmonics", "PolyTriangle", "Resonator"}) {
     for (const Precision precision : {Precision::float32, Precision::float64}) {
       if (precision == Precision::float64 && !support::is_thorough()) {
-        continue;  // the other has less to spare
+        continue;  // the other precision has a smaller margin
       }
       const auto scene = load_scene(folder + name + ".toml", {});
       REQUIRE(scene);
@@ -246,9 +246,9 @@ TEST_CASE("Nobody in the instruments runs away", "[watch]") {
   }
 }
 
-// --- taking over --------------------------------------------------------------------------------
+// --- takeover -----------------------------------------------------------------------------------
 
-TEST_CASE("Who sleeps is taken over asleep, and wakes the same", "[watch]") {
+TEST_CASE("A frozen part is taken over frozen and unfreezes the same way", "[watch]") {
   const auto string = [](const std::string& p, int output) {
     return scenes::string(p, 10, "0.1", "0.01") + "@in" + std::to_string(output) + " frcInput @" +
            p + "_m2\n" + scenes::output(output, p + "_m6");
@@ -273,16 +273,16 @@ TEST_CASE("Who sleeps is taken over asleep, and wakes the same", "[watch]") {
       Player stays(text, preset, {.method = Method::direct});
       Player leaves(text, preset, {.method = Method::direct});
       Player comes(text, preset, {.method = to});
-      comes.run(was_asleep ? 16384 : 100);  // itself asleep, in both parts, or not
+      comes.run(was_asleep ? 16384 : 100);  // frozen itself in both parts, or not
       CHECK(comes.engine().meters().saved == (was_asleep ? 1.0 : 0.0));
       for (Player* player : {&stays, &leaves}) {
         player->run(quiet, events);
         player->run(4384, {blow(0, 1)});
         CHECK(player->engine().meters().saved == 0.5);
-        CHECK(player->out[1].back() != 0.0);  // it stands where it fell asleep
+        CHECK(player->out[1].back() != 0.0);  // it keeps its frozen position
         CHECK(player->out[1].back() == player->out[1][quiet + 100]);
       }
-      REQUIRE(comes.engine().go_on_from(leaves.engine()));
+      REQUIRE(comes.engine().continue_from(leaves.engine()));
       CHECK(comes.engine().meters().saved == 0.5);
       const std::size_t begun = comes.y().size();
       const std::size_t begun_there = stays.y().size();

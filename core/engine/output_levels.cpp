@@ -1,11 +1,11 @@
-#include "core/engine/mixing/output_levels.h"
+#include "core/engine/output_levels.h"
 
 #include <cmath>
 
 namespace ressort::engine {
 namespace {
 
-// From one level to any other each frame changes it by less than 60 dB below full scale.
+// A level changes by less than 60 dB below full scale in each frame of this ramp.
 constexpr double ramp_s = 0.025;
 
 }  // namespace

@@ -1,5 +1,4 @@
-// core/engine: takes from the outputs of an instrument what a loudspeaker cannot say: where its
-// hands rest.
+// core/engine: removes DC, such as the rest positions of inputs, from the outputs.
 #pragma once
 
 #include <array>
@@ -12,9 +11,9 @@
 
 namespace ressort::engine {
 
-// A high-pass filter of first order at 5 Hz for every channel:
+// A first-order high-pass filter at 5 Hz for every channel:
 //   y[n] = x[n] - x[n-1] + pole y[n-1]
-// Once nothing comes in at all its memory fades in milliseconds, so that a panic is silent at once.
+// The state decays within milliseconds at zero input, so that a panic is silent at once.
 class DcBlocker {
  public:
   static constexpr double corner_hz = 5.0;
@@ -24,7 +23,7 @@ class DcBlocker {
       : pole_(std::exp(-2.0 * std::numbers::pi * corner_hz / rate_hz)),
         quick_pole_(std::exp(-1.0 / (0.0005 * rate_hz))) {}
 
-  // In place. [audio] wait-free, O(frames * channels)
+  // Filters in place. [audio] wait-free, O(frames * channels)
   void process(std::span<double* const> channels, std::size_t frames) {
     for (std::size_t c = 0; c < channels.size() && c < max_channels; ++c) {
       State state = states_[c];
@@ -41,7 +40,7 @@ class DcBlocker {
   }
 
  private:
-  static constexpr double nothing = 1e-7;  // of full scale
+  static constexpr double nothing = 1e-7;  // -140 dBFS
   struct State {
     double in = 0.0;
     double out = 0.0;

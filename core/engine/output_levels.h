@@ -1,4 +1,4 @@
-// core/engine: what the outputs of the model are multiplied by before they are mixed.
+// core/engine: the level formulas of the model's outputs.
 #pragma once
 
 #include <cstddef>
@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "core/engine/mixing/bank.h"
+#include "core/engine/bank.h"
 #include "core/engine/voices.h"
 
 namespace ressort::engine {
@@ -15,29 +15,29 @@ namespace ressort::engine {
 class OutputLevels {
  public:
   OutputLevels(const Machine& machine, const Playing& playing);
-  void go_on_from(const OutputLevels& from) { parts_ = from.parts_; }
+  void continue_from(const OutputLevels& from) { parts_ = from.parts_; }
 
-  // Parameters have these values from here on: levels move there in a straight line, or at once
-  // where nothing sounds yet, and in a bare network.
+  // Computes the levels for new parameter values. Levels ramp linearly; they jump if `at_once` is
+  // true, and in the bare network.
   void follow(const Machine& machine, std::span<const double> parameters, bool at_once);
-  // A kernel has stepped: what it says is multiplied.
+  // Multiplies the outputs of a kernel that has stepped.
   template <class T>
   void apply(Bank<T>& bank, const VoiceGroup& group, std::size_t frames) const;
-  // All kernels have.
+  // Advances the ramps after all kernels have stepped.
   void advance(std::size_t frames);
 
  private:
   struct Level {
     std::uint32_t output = 0;  // of the part
     double now = 1.0;
-    double step = 0.0;  // in a frame, as long as `frames` are left
+    double step = 0.0;  // per frame of the ramp
     double target = 1.0;
-    std::size_t frames = 0;
+    std::size_t frames = 0;  // left of the ramp
     double after(std::size_t n) const {
       return n < frames ? now + step * static_cast<double>(n) : target;
     }
   };
-  std::vector<std::vector<Level>> parts_;  // [part] those that have one
+  std::vector<std::vector<Level>> parts_;  // [part] outputs with a level
   std::size_t ramp_frames_;
 };
 

@@ -1,4 +1,4 @@
-#include "core/engine/mixing/audio_inputs.h"
+#include "core/engine/audio_inputs.h"
 
 #include <algorithm>
 #include <bit>
@@ -12,13 +12,13 @@ AudioInputs::AudioInputs(const Machine& machine, const Playing& playing, IsSilen
       const ModelInput& input = machine.inputs[control.target];
       const double r = input.is_force ? machine.rate_ratio : 1.0;
       inputs_[control.target] = {.control = &control,
-                                 .scale = control.high * r * r,
+                                 .scale = control.settings.high * r * r,
                                  .before = playing.bare ? input.position : 0.0};
     }
   }
 }
 
-void AudioInputs::go_on_from(const AudioInputs& from) {
+void AudioInputs::continue_from(const AudioInputs& from) {
   for (std::size_t input = 0; input < inputs_.size(); ++input) {
     inputs_[input].before = from.inputs_[input].before;
   }
@@ -30,7 +30,7 @@ const double* AudioInputs::channel_of(const Driven& input, const Segment& segmen
              : nullptr;
 }
 
-bool AudioInputs::listen(const Segment& segment) {
+bool AudioInputs::find_sound(const Segment& segment) {
   bool any = false;
   for (Driven& input : inputs_) {
     input.samples = nullptr;
@@ -46,7 +46,7 @@ bool AudioInputs::listen(const Segment& segment) {
   return any;
 }
 
-void AudioInputs::remember(const Segment& segment) {
+void AudioInputs::keep_last_samples(const Segment& segment) {
   for (Driven& input : inputs_) {
     if (const double* const channel = channel_of(input, segment)) {
       input.before = input.scale * channel[segment.end() - 1];
@@ -54,10 +54,10 @@ void AudioInputs::remember(const Segment& segment) {
   }
 }
 
-// How many inputs of a part from `first` on are moved by sound, all of them positions or all
-// forces: as many as are added in one pass.
-std::size_t AudioInputs::side_by_side(const Program& program, std::size_t first,
-                                      std::size_t most) const {
+// Returns how many inputs of a part from `first` on can be added in one pass: audio drives all of
+// them, and they are all positions or all forces. The result is 0 or a power of 2.
+std::size_t AudioInputs::count_adjacent(const Program& program, std::size_t first,
+                                        std::size_t most) const {
   const auto is_alike = [&](std::size_t i) {
     const InputSlot& slot = program.inputs[i];
     return inputs_[slot.input].samples != nullptr &&
@@ -70,33 +70,33 @@ std::size_t AudioInputs::side_by_side(const Program& program, std::size_t first,
   return std::bit_floor(count);
 }
 
-bool AudioInputs::move_all(const Program& program) const {
+bool AudioInputs::drives_all(const Program& program) const {
   return !program.inputs.empty() &&
          std::all_of(program.inputs.begin(), program.inputs.end(),
-                     [&](const InputSlot& slot) { return moves(slot.input); });
+                     [&](const InputSlot& slot) { return drives(slot.input); });
 }
 
 template <class T>
-void AudioInputs::add(Bank<T>& bank, const VoiceGroup& group, std::size_t frames, bool rests,
+void AudioInputs::add(Bank<T>& bank, const VoiceGroup& group, std::size_t frames, bool at_rest,
                       const Voices& voices, EnergyWatch& watch) const {
   const PartBank<T>& part = bank.parts[group.part];
   const std::size_t width = bank.lanes_of_rows(part);
   const std::size_t most = width == 1 ? AudioInput<T>::most : 1;
   std::size_t next = 0;
   for (std::size_t i = 0; i < part.program.inputs.size(); i = next) {
-    const std::size_t count = side_by_side(part.program, i, most);
+    const std::size_t count = count_adjacent(part.program, i, most);
     next = i + std::max<std::size_t>(1, count);
     if (count == 0) {
       continue;
     }
     for (std::size_t lane = group.first; lane < group.end; ++lane) {
-      watch.stir(voices[lane], lane, group.part);
+      watch.mark_driven(voices[lane], lane, group.part);
     }
     bank.filled_part = nullptr;
     AudioInput<T> added;
     added.count = count;
     added.frames = frames;
-    added.rests = rests || bare_;
+    added.rests = at_rest || bare_;
     added.value = bank.value.data() + i * width;
     added.velocity = nullptr;
     added.step = part.program.inputs.size() * width;
@@ -109,7 +109,7 @@ void AudioInputs::add(Bank<T>& bank, const VoiceGroup& group, std::size_t frames
       added.rest[sound] = bare_ ? T(0) : bank.row[(i + sound) * part.width];
     }
     if (!part.program.inputs[i].is_force) {
-      bank.still = 0;
+      bank.zero_velocities = 0;
       added.velocity = bank.velocity.data() + i * width;
     }
     bank.mixer.add_audio(added);

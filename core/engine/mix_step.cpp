@@ -1,5 +1,5 @@
 // The loops over the voices of one kernel, compiled for each instruction set.
-#include "core/engine/mixing/mix.h"
+#include "core/engine/mix.h"
 
 #include <limits>
 #include <utility>
@@ -11,9 +11,8 @@ namespace {
 
 constexpr std::size_t widest = vector_bytes(Isa::RESSORT_ISA);
 
-// A pack's numbers as they are stored. Without their signs they are ordered as the numbers are, and
-// infinity and what is no number come after all others: integers are compared in a fraction of the
-// time.
+// The bit patterns of a pack. Without the sign bit they have the order of the magnitudes, with
+// infinity and NaN after all others. Integer comparisons are faster than floating-point ones.
 template <class V>
 using Bits = decltype(V{} < V{});
 
@@ -22,7 +21,7 @@ Bits<V> magnitude(V y) {
   return reinterpret_cast<Bits<V>>(y) & std::numeric_limits<Scalar<Bits<V>>>::max();
 }
 
-// The first numbers of a pack, and zeros: what whole packs leave over.
+// Loads the `count` numbers that remain after whole packs, and fills up with zeros.
 template <class V>
 [[gnu::noinline]] V load_some(const Scalar<V>* from, std::size_t count) {
   V pack{};
@@ -32,7 +31,7 @@ template <class V>
   return pack;
 }
 
-// --- what goes in -------------------------------------------------------------------------------
+// --- inputs -------------------------------------------------------------------------------------
 
 bool is_silent(const double* samples, std::size_t frames) {
   using V = Pack<double, widest>;
@@ -92,7 +91,7 @@ template <class T, class Added>
   const std::size_t frames = input.frames;
   if (!input.rests) {
     add_rows<T>(added, nullptr, frames, input.step, input.width, rows);
-  } else if (input.step == 1) {  // the usual case, and the compiler is to know it
+  } else if (input.step == 1) {  // the usual case, compiled with constants
     add_rows<T>(added, &rest, frames, 1, 1, rows);
   } else {
     add_rows<T>(added, &rest, frames, input.step, input.width, rows);
@@ -114,7 +113,7 @@ void add_one_sound(const AudioInput<T>& input) {
   }
 }
 
-// Of one lane, all in one pass.
+// Adds several channels in one pass, for kernels with one lane.
 template <std::size_t Sounds, class T>
 void add_sounds(const AudioInput<T>& input) {
   using D = Pack<double, Sounds * sizeof(double)>;
@@ -163,7 +162,8 @@ Bits<V> larger(Bits<V> a, Bits<V> b) {
   return a > b ? a : b;
 }
 
-// Of the packs y, y + step and so on; four at once, so that none waits for the one before.
+// Returns the largest magnitudes in the packs at y, y + step and so on. Four independent maxima
+// keep the pipeline full.
 template <class V, class T>
 Bits<V> largest_of(const T* y, std::size_t count, std::size_t step) {
   constexpr std::size_t together = 4;
@@ -187,7 +187,7 @@ V within(Bits<V> largest, double bound) {
   return select(peak < V{} + static_cast<Scalar<V>>(bound), peak, beyond);
 }
 
-// One lane: its samples lie one after the other.
+// Returns the peak of a kernel with one lane, whose samples are contiguous.
 template <class T>
 T peak_of_one(const T* y, std::size_t count, double bound) {
   using V = Pack<T, widest>;
@@ -223,9 +223,9 @@ void find_peaks(const Heard<T>& heard, double bound, T* peak) {
   }
 }
 
-// --- what comes out -----------------------------------------------------------------------------
+// --- outputs ------------------------------------------------------------------------------------
 
-// Of both packs the even blocks of so many numbers, or the odd ones.
+// Returns the even or the odd blocks of `Block` numbers of two packs.
 template <std::size_t Block, std::size_t Odd, class V, std::size_t... I>
 [[gnu::always_inline]] inline V blocks_of(V a, V b, std::index_sequence<I...>) {
   constexpr std::size_t lanes = sizeof...(I);
@@ -233,7 +233,7 @@ template <std::size_t Block, std::size_t Odd, class V, std::size_t... I>
       a, b, (I / Block % 2 * lanes + (I / Block / 2 * 2 + Odd) * Block + I % Block)...);
 }
 
-// The sums of as many packs as each has numbers, side by side.
+// Sums each pack of a square matrix of packs by a transposing tree of shuffles and additions.
 template <std::size_t Block = 1, class V>
 [[gnu::always_inline]] inline V sums_of(V* packs) {
   constexpr std::size_t lanes = sizeof(V) / sizeof(Scalar<V>);
@@ -249,9 +249,9 @@ template <std::size_t Block = 1, class V>
   }
 }
 
-// channel[n] += the sum of gain[lane] * rows[n * step + lane], for as many frames at once as there
-// are numbers in a pack: a gain is looked at once for all of them, and their sums are folded
-// together. Of float, in float: its lanes are as exact.
+// channel[n] += sum of gain[lane] * rows[n * step + lane], for as many frames at once as a pack has
+// numbers. Each gain is loaded once for all of these frames, and their sums are folded together.
+// Float outputs are summed in float, which is as exact as the lanes themselves.
 template <class V, class T>
 void add_lanes(const T* rows, std::size_t step, std::size_t used, const T* gain, std::size_t frames,
                double* channel) {
@@ -280,7 +280,7 @@ void add_lanes(const T* rows, std::size_t step, std::size_t used, const T* gain,
   }
 }
 
-// The widest packs that the lanes fill.
+// Mixes with the widest packs that the lanes fill.
 template <std::size_t Bytes = widest, class T>
 void add_lanes_of(const T* rows, std::size_t step, std::size_t used, const T* gain,
                   std::size_t frames, double* channel) {
@@ -292,8 +292,8 @@ void add_lanes_of(const T* rows, std::size_t step, std::size_t used, const T* ga
   add_lanes<Pack<T, Bytes>>(rows, step, used, gain, frames, channel);
 }
 
-// One lane. Of one output its samples lie one after the other, of two every other is its: the usual
-// cases, and the compiler is to know them.
+// Mixes a kernel with one lane. Steps of 1 and 2 (one or two outputs) are the usual cases, compiled
+// with constants.
 template <std::size_t Step, class T>
 void add_one(const T* y, std::size_t frames, double gain, double* __restrict channel) {
   for (std::size_t n = 0; n < frames; ++n) {

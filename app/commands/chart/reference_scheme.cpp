@@ -1,4 +1,4 @@
-#include "core/engine/reference.h"
+#include "app/commands/chart/reference_scheme.h"
 
 #include <algorithm>
 #include <array>
@@ -11,7 +11,7 @@ struct ressort::ScalarOf<long double> {
   using Type = long double;
 };
 
-namespace ressort::engine {
+namespace ressort::commands {
 namespace {
 
 std::vector<double> coefficients_of(const Program& program) {
@@ -43,7 +43,7 @@ ReferenceScheme::ReferenceScheme(const Program& program)
   }
 }
 
-// What a node stands for: itself, or the nodes around it.
+// Calls use(node, weight) for the node itself, or for the nodes that carry a place on a macro.
 template <class Use>
 void ReferenceScheme::behind(std::uint32_t node, Use&& use) const {
   if (program_.taps.empty() || node < program_.taps[0].node) {
@@ -142,8 +142,8 @@ std::vector<double> ReferenceScheme::velocities() const {
   return narrowed(v_);
 }
 
-StoredEnergy energy_of(const Program& program, std::span<const double> x,
-                       std::span<const double> v_before, std::span<const double> v_after) {
+StoredEnergy stored_energy(const Program& program, std::span<const double> x,
+                           std::span<const double> v_before, std::span<const double> v_after) {
   const std::vector<double> coefficient = coefficients_of(program);
   StoredEnergy energy;
   for (const MassRun& run : program.mass_runs) {
@@ -167,4 +167,4 @@ StoredEnergy energy_of(const Program& program, std::span<const double> x,
   return energy;
 }
 
-}  // namespace ressort::engine
+}  // namespace ressort::commands

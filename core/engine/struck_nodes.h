@@ -1,4 +1,4 @@
-// core/engine: masses and places that are struck by themselves, without an input.
+// core/engine: strikes on masses and places that have no input.
 #pragma once
 
 #include <algorithm>
@@ -15,14 +15,13 @@ class StruckNodes {
  public:
   static constexpr std::uint32_t nowhere = 0xffffffffu;
 
-  // Where a mass of the network with its macros written out is in the machine; nowhere if it does
-  // not move, or was culled. A place is where its point is.
+  // The position of a mass in the machine. `nowhere` if the mass is fixed or was culled.
   struct At {
     std::uint32_t part = nowhere;
     std::uint32_t node = 0;
   };
 
-  // The machine outlives it. [any thread but audio]
+  // The machine must outlive this object. [any thread but audio]
   explicit StruckNodes(const Machine& machine) : machine_(machine) {
     std::size_t most = 1;
     for (std::uint32_t p = 0; p < machine.parts.size(); ++p) {
@@ -43,14 +42,16 @@ class StruckNodes {
     changes_.reserve(most);
   }
 
+  // `mass`: index into the network with expanded macros.
   At find(double mass) const {
     return mass >= 0.0 && mass < static_cast<double>(at_.size())
                ? at_[static_cast<std::size_t>(mass)]
                : At{};
   }
 
-  // What a force there changes, per sample: at most as many nodes as the place has around it, or
-  // its body modes. `coefficient(c)` is the voice's. Good until the next call. [audio]
+  // Returns the changes of velocity that a force causes: of a mass, or of the nodes or body modes
+  // that carry a place. coefficient(c) returns the voice's values. The result is valid until the
+  // next call. [audio]
   struct Change {
     std::span<const std::uint32_t> nodes;
     std::span<const double> speeds;

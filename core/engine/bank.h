@@ -1,5 +1,5 @@
-// core/engine: the kernels' side of an engine. Every part's kernels in one precision, and the
-// buffers that drive them and that they fill.
+// core/engine: the kernels of all parts and voices in one precision, with their input and output
+// buffers.
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/engine/mixing/mix.h"
+#include "core/engine/mix.h"
 #include "core/kernels/domains/kernel_task.h"
 #include "core/kernels/domains/sharded_form.h"
 #include "core/kernels/registry.h"
@@ -16,7 +16,7 @@
 
 namespace ressort::engine {
 
-// One part of the machine, in as many voices as are wanted.
+// The kernels of one part of the machine. Each kernel steps `width` voices.
 template <class T>
 struct PartBank {
   PartBank(const Program& program_in, std::size_t voices, Isa isa, const Progress& progress)
@@ -36,16 +36,16 @@ struct PartBank {
   const Program& program;
   std::size_t width = 1;
   std::vector<std::unique_ptr<Kernel<T>>> kernels;  // [voice / width]
-  Aligned<T> last;                                  // [kernel][output][lane] the last sample's
+  Aligned<T> last;                                  // [kernel][output][lane] last sample
 };
 
-// The kernels of a part that several threads step. Each has buffers of its own.
+// The kernels of a part that several threads step. Each has its own buffers.
 template <class T>
 struct SharedPart {
   std::vector<std::unique_ptr<KernelTask<T>>> tasks;  // [kernel]
   std::vector<std::uint32_t> wanted;                  // kernels that step in this block
-  double kernel_ns = 0.0;                             // a sample of one of them
-  std::unique_ptr<Crew> crew;                         // the last: it ends first; null: one thread
+  double kernel_ns = 0.0;                             // predicted time of a kernel per sample
+  std::unique_ptr<Crew> crew;  // declared last, so destroyed first; null: one thread
 };
 
 template <class T>
@@ -57,7 +57,7 @@ struct Bank : BlockBuffers<T> {
     std::size_t inputs = 0;
     std::size_t most_inputs = 0;
     std::size_t audio_coefficients = 0;
-    std::size_t channels = 0;
+    std::size_t most_outputs = 0;
     std::size_t lanes = 0;
     std::size_t outputs_of_one = 0;
     std::size_t nodes = 0;
@@ -66,7 +66,7 @@ struct Bank : BlockBuffers<T> {
       inputs = std::max(inputs, width * program.inputs.size());
       most_inputs = std::max(most_inputs, program.inputs.size());
       audio_coefficients = std::max(audio_coefficients, width * program.audio_coefficients.size());
-      channels = std::max(channels, width * program.outputs.size());
+      most_outputs = std::max(most_outputs, width * program.outputs.size());
       lanes = std::max(lanes, width);
       outputs_of_one = std::max(outputs_of_one, program.outputs.size());
       nodes = std::max(nodes, program.position.size());
@@ -74,12 +74,12 @@ struct Bank : BlockBuffers<T> {
     this->value.resize(max_block_frames * inputs);
     this->velocity.resize(this->value.size());
     this->audio.resize(max_block_frames * audio_coefficients);
-    this->outputs.resize(max_block_frames * channels);
+    this->outputs.resize(max_block_frames * most_outputs);
     row.resize(inputs);
     common_row.resize(most_inputs);
     peak.resize(lanes);
     gain.resize(lanes);
-    heard.resize(outputs_of_one);
+    channels.resize(outputs_of_one);
     x.resize(nodes);
     v.resize(nodes);
     for (std::size_t p = 0; p < parts.size(); ++p) {
@@ -87,7 +87,7 @@ struct Bank : BlockBuffers<T> {
     }
   }
 
-  // Calls `use(part, group)` for every kernel.
+  // Calls use(part, group) for every kernel.
   template <class Use>
   void each_group(Use&& use) {
     for (std::size_t p = 0; p < parts.size(); ++p) {
@@ -97,10 +97,10 @@ struct Bank : BlockBuffers<T> {
     }
   }
 
-  // Calls drive(part, group) for every kernel, steps those for which it says so, and calls
-  // mix(part, group, whether it has stepped): one after the other, or where a part takes long all
-  // of it at once. Voices do not hear each other, so that this comes to the same bits. Those from
-  // `end` on sleep.
+  // Computes one segment. For every kernel it calls drive(part, group), steps the kernel if the
+  // result is true, and calls mix(part, group, has_stepped). The kernels of an expensive part are
+  // stepped by several threads; voices are independent, so the result has the same bits. Lanes
+  // from `end` on sleep.
   template <class Drive, class Mix>
   void step(std::size_t frames, std::size_t end, Drive&& drive, Mix&& mix) {
     awake_end_ = end;
@@ -127,35 +127,34 @@ struct Bank : BlockBuffers<T> {
     }
   }
 
-  // Whether one row may be for all lanes of a kernel; it is where `is_common` says so.
+  // Returns whether a part's kernels accept one input row for all lanes (see is_common).
   bool may_be_common(std::size_t p) const {
     return !shared[p].crew && parts[p].kernels[0]->takes_common_inputs();
   }
   std::size_t lanes_of_rows(const PartBank<T>& part) const { return is_common ? 1 : part.width; }
 
-  static constexpr double least_shared_ns = 5000.0;  // of a kernel in a block
+  static constexpr double least_shared_ns = 5000.0;  // kernel time per block that pays for threads
 
   std::size_t voices;
   std::vector<PartBank<T>> parts;
   std::vector<SharedPart<T>> shared;  // [part]
-  // The buffers are as Block says; each part in turn, or each kernel that brings its own.
-  bool is_common = false;
+  bool is_common = false;             // one input row serves all lanes of the current kernel
 
-  // Drivers that rest give every frame the same row, [input][lane], and no velocity. Of what the
-  // buffers hold, it is in so many frames of `filled_part`, and so many velocities are 0.
-  Aligned<T> row;
-  Aligned<T> common_row;  // [input] the same of one lane, which is that of all
+  // Drivers at rest give every frame the same row and no velocity. The fields below cache what the
+  // buffers hold: the row in `filled_frames` frames of `filled_part`, and leading zero velocities.
+  Aligned<T> row;         // [input][lane]
+  Aligned<T> common_row;  // [input] if all lanes are equal
   const PartBank<T>* filled_part = nullptr;
   std::size_t filled_frames = 0;
   bool filled_common = false;
-  std::size_t still = 0;
+  std::size_t zero_velocities = 0;
 
   Mixer<T> mixer;
   Aligned<T> peak;        // [lane]
   Aligned<T> gain;        // [lane]
-  std::vector<double> x;  // [node] of a voice that is looked at, or taken over
+  std::vector<double> x;  // [node] positions of a voice that is inspected or taken over
   std::vector<double> v;
-  std::vector<double*> heard;  // [output] where it is to be added
+  std::vector<double*> channels;  // [output] destination of the mix
 
  private:
   VoiceGroup group_of(std::size_t p, std::size_t kernel) const {
@@ -163,7 +162,7 @@ struct Bank : BlockBuffers<T> {
     return {p, first, std::min(voices, first + parts[p].width)};
   }
 
-  // Those that may be awake.
+  // Returns the lanes of a kernel that may be awake.
   VoiceGroup awake_of(std::size_t p, std::size_t kernel) const {
     VoiceGroup group = group_of(p, kernel);
     group.end = std::max(group.first, std::min(group.end, awake_end_));
@@ -208,7 +207,7 @@ struct Bank : BlockBuffers<T> {
     together.wanted.clear();
     for (std::uint32_t kernel = 0; kernel < together.tasks.size(); ++kernel) {
       KernelTask<T>& task = *together.tasks[kernel];
-      forget_filled();
+      clear_cache();
       with_buffers_of(task, [&] {
         const VoiceGroup group = awake_of(p, kernel);
         if (drive(parts[p], group)) {
@@ -218,7 +217,7 @@ struct Bank : BlockBuffers<T> {
         }
       });
     }
-    forget_filled();
+    clear_cache();
     together.crew->run(together.wanted);
     auto next = together.wanted.begin();
     for (std::uint32_t kernel = 0; kernel < together.tasks.size(); ++kernel) {
@@ -229,9 +228,9 @@ struct Bank : BlockBuffers<T> {
     }
   }
 
-  void forget_filled() {
+  void clear_cache() {
     filled_part = nullptr;
-    still = 0;
+    zero_velocities = 0;
   }
 
   std::size_t awake_end_ = 0;

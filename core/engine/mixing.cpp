@@ -1,4 +1,4 @@
-#include "core/engine/mixing/mixing.h"
+#include "core/engine/mixing.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@ namespace ressort::engine {
 
 Mixing::Mixing(const Playing& playing)
     : gain_(playing.gain),
-      loudest_(playing.bare ? runaway : std::min(runaway, runaway_level / playing.gain)) {}
+      bound_(playing.bare ? runaway : std::min(runaway, runaway_level / playing.gain)) {}
 
 template <class T>
 void Mixing::add(Bank<T>& bank, const VoiceGroup& group, const Segment& segment, Voices& voices,
@@ -15,7 +15,7 @@ void Mixing::add(Bank<T>& bank, const VoiceGroup& group, const Segment& segment,
   PartBank<T>& part = bank.parts[group.part];
   const std::size_t count = part.program.outputs.size();
   const std::size_t width = part.width;
-  constexpr std::size_t pack = 64 / sizeof(T);  // the widest
+  constexpr std::size_t pack = widest_bytes / sizeof(T);
   const std::size_t used = group.end - group.first;
   const Heard<T> heard{.outputs = bank.outputs.data(),
                        .frames = segment.frames,
@@ -23,14 +23,14 @@ void Mixing::add(Bank<T>& bank, const VoiceGroup& group, const Segment& segment,
                        .width = width,
                        .lanes = std::min(width, (used + pack - 1) / pack * pack)};
   const auto is_heard = [&](std::size_t lane) {
-    return voices[lane].awake && !watch.is_still(lane, group.part);
+    return voices[lane].awake && !watch.is_frozen(lane, group.part);
   };
-  bool is_any_lost = false;
+  bool is_any_unstable = false;
   bool are_all_steady = true;
   std::fill_n(bank.gain.begin(), heard.lanes, T(0));
   for (std::size_t lane = group.first; lane < group.end; ++lane) {
     const Voice& voice = voices[lane];
-    is_any_lost |= voice.lost;
+    is_any_unstable |= voice.unstable;
     if (!is_heard(lane)) {
       continue;
     }
@@ -41,10 +41,10 @@ void Mixing::add(Bank<T>& bank, const VoiceGroup& group, const Segment& segment,
     }
   }
   for (std::size_t output = 0; output < count; ++output) {
-    bank.heard[output] = segment.outputs[part.program.outputs[output].channel] + segment.at;
+    bank.channels[output] = segment.outputs[part.program.outputs[output].channel] + segment.at;
   }
   const bool is_mixed =
-      bank.mixer.mix(heard, loudest_, bank.gain.data(), bank.heard.data(), bank.peak.data());
+      bank.mixer.mix(heard, bound_, bank.gain.data(), bank.channels.data(), bank.peak.data());
   for (std::size_t lane = group.first; lane < group.end; ++lane) {
     if (!is_heard(lane)) {
       continue;
@@ -54,15 +54,15 @@ void Mixing::add(Bank<T>& bank, const VoiceGroup& group, const Segment& segment,
     const auto sample = [&](std::size_t n, std::size_t output) {
       return static_cast<double>(bank.outputs[(n * count + output) * width + lane - group.first]);
     };
-    if (!(peak < loudest_)) {
-      const std::size_t sane = sane_frames(segment.frames, count, sample);
+    if (!(peak < bound_)) {
+      const std::size_t sane = count_sane_frames(segment.frames, count, sample);
       add_one(part.program, voice, segment, 0, sane, sample);
-      watch.lose(part,
-                 sane > 0 ? bank.outputs.data() + (sane - 1) * part.row() : part.last_of(lane),
-                 lane, group.part, voices);
-      add_held(part.program, voice, segment, sane, watch.held(lane, group.part));
+      watch.freeze_unstable(
+          part, sane > 0 ? bank.outputs.data() + (sane - 1) * part.row() : part.last_of(lane), lane,
+          group.part, voices);
+      add_constant(part.program, voice, segment, sane, watch.frozen_outputs(lane, group.part));
       bank.gain[lane - group.first] = T(0);
-      is_any_lost = true;
+      is_any_unstable = true;
       continue;
     }
     voice.peak = std::max(voice.peak, peak);
@@ -71,34 +71,36 @@ void Mixing::add(Bank<T>& bank, const VoiceGroup& group, const Segment& segment,
     }
   }
   if (!is_mixed) {
-    bank.mixer.add_voices(heard, bank.gain.data(), bank.heard.data());
+    bank.mixer.add_voices(heard, bank.gain.data(), bank.channels.data());
   }
-  keep_last(bank, group, segment.frames, is_any_lost, voices, watch);
+  keep_last(bank, group, segment.frames, is_any_unstable, voices, watch);
   clear_wide_registers();
 }
 
-// What has left its bounds is no last sample: the next voice in that lane might stand still on it.
+// Keeps the last sample of each lane. An unstable voice keeps its last sane sample instead, because
+// the next voice in that lane might be frozen at it.
 template <class T>
-void Mixing::keep_last(Bank<T>& bank, const VoiceGroup& group, std::size_t frames, bool is_any_lost,
-                       const Voices& voices, const EnergyWatch& watch) {
+void Mixing::keep_last(Bank<T>& bank, const VoiceGroup& group, std::size_t frames,
+                       bool is_any_unstable, const Voices& voices, const EnergyWatch& watch) {
   PartBank<T>& part = bank.parts[group.part];
   T* const last = part.last_of(group.first);
   std::copy_n(bank.outputs.data() + (frames - 1) * part.row(), part.row(), last);
-  for (std::size_t lane = group.first; is_any_lost && lane < group.end; ++lane) {
-    for (std::size_t output = 0; voices[lane].lost && output < part.program.outputs.size();
+  for (std::size_t lane = group.first; is_any_unstable && lane < group.end; ++lane) {
+    for (std::size_t output = 0; voices[lane].unstable && output < part.program.outputs.size();
          ++output) {
       last[output * part.width + lane - group.first] =
-          static_cast<T>(watch.held(lane, group.part)[output]);
+          static_cast<T>(watch.frozen_outputs(lane, group.part)[output]);
     }
   }
 }
 
-// How many frames there are before one that is beyond what any output reaches.
+// Returns the number of frames before the first one out of bounds.
 template <class Sample>
-std::size_t Mixing::sane_frames(std::size_t frames, std::size_t outputs, Sample&& sample) const {
+std::size_t Mixing::count_sane_frames(std::size_t frames, std::size_t outputs,
+                                      Sample&& sample) const {
   for (std::size_t n = 0; n < frames; ++n) {
     for (std::size_t output = 0; output < outputs; ++output) {
-      if (!(std::fabs(sample(n, output)) < loudest_)) {
+      if (!(std::fabs(sample(n, output)) < bound_)) {
         return n;
       }
     }
@@ -106,7 +108,7 @@ std::size_t Mixing::sane_frames(std::size_t frames, std::size_t outputs, Sample&
   return frames;
 }
 
-// One voice by itself: its `sample(n, output)` in frames [from, to) of the segment.
+// Mixes one voice with changing gains: sample(n, output) in frames [from, to) of the segment.
 template <class Sample>
 void Mixing::add_one(const Program& program, const Voice& voice, const Segment& segment,
                      std::size_t from, std::size_t to, Sample&& sample) const {
@@ -125,24 +127,24 @@ void Mixing::add_one(const Program& program, const Voice& voice, const Segment& 
   }
 }
 
-void Mixing::add_held(const Program& program, const Voice& voice, const Segment& segment,
-                      std::size_t from, const double* held) const {
+void Mixing::add_constant(const Program& program, const Voice& voice, const Segment& segment,
+                          std::size_t from, const double* outputs) const {
   add_one(program, voice, segment, from, segment.frames,
-          [&](std::size_t, std::size_t output) { return held[output]; });
+          [&](std::size_t, std::size_t output) { return outputs[output]; });
 }
 
-void Mixing::add_still(const Program& program, const VoiceGroup& group, const Segment& segment,
-                       const Voices& voices, const EnergyWatch& watch) const {
+void Mixing::add_frozen(const Program& program, const VoiceGroup& group, const Segment& segment,
+                        const Voices& voices, const EnergyWatch& watch) const {
   for (std::size_t lane = group.first; lane < group.end; ++lane) {
-    const double* const held = watch.held(lane, group.part);
-    if (voices[lane].awake && watch.is_still(lane, group.part) &&
-        std::any_of(held, held + program.outputs.size(), [](double y) { return y != 0.0; })) {
-      add_held(program, voices[lane], segment, 0, held);
+    const double* const outputs = watch.frozen_outputs(lane, group.part);
+    if (voices[lane].awake && watch.is_frozen(lane, group.part) &&
+        std::any_of(outputs, outputs + program.outputs.size(), [](double y) { return y != 0.0; })) {
+      add_constant(program, voices[lane], segment, 0, outputs);
     }
   }
 }
 
-// Uniform in -1..1: xorshift, from a fixed seed so that a render repeats.
+// Uniform noise in -1..1 by xorshift64 (Marsaglia 2003). The seed is fixed, so renders repeat.
 void Mixing::make_noise(const Segment& segment) {
   for (std::size_t n = segment.at; n < segment.end(); ++n) {
     for (double* const output : segment.outputs) {

@@ -1,4 +1,4 @@
-// core/engine: the last guard before a loudspeaker.
+// core/engine: the output limiter.
 #pragma once
 
 #include <array>
@@ -9,9 +9,9 @@
 
 namespace ressort::engine {
 
-// A look-ahead limiter: the output never passes `ceiling`, is never non-finite, and is the input,
-// bit for bit and 1 ms later, as long as that stays below. All channels share one gain, so the
-// stereo picture stands still. Heap-free after construction.
+// A look-ahead limiter. The output never exceeds `ceiling` and is always finite. Input below the
+// ceiling passes bit for bit, 48 frames later (1 ms at 48 kHz). All channels share one gain, so the
+// stereo image does not move. No memory is allocated after construction.
 class Limiter {
  public:
   static constexpr std::size_t lookahead_frames = 48;
@@ -20,10 +20,10 @@ class Limiter {
 
   explicit Limiter(double rate_hz);
 
-  // In place. [audio] wait-free, O(frames * (channels + lookahead_frames)) at worst
+  // Limits in place. [audio] wait-free, O(frames * (channels + lookahead_frames)) at worst
   void process(std::span<double* const> channels, std::size_t frames);
 
-  // The deepest gain reduction since the last call, as a factor 0..1. [audio]
+  // Returns the lowest gain since the last call, 0..1. [audio]
   double take_reduction();
 
  private:
@@ -31,14 +31,14 @@ class Limiter {
   void limit(std::span<double* const> channels, std::size_t frames);
 
   std::array<std::array<double, lookahead_frames>, max_channels> delayed_{};
-  std::array<double, lookahead_frames> wanted_{};    // gain that each sample in flight needs
-  std::array<double, lookahead_frames> smoothed_{};  // the last gains, for their mean
+  std::array<double, lookahead_frames> wanted_{};    // gain that each delayed sample needs
+  std::array<double, lookahead_frames> smoothed_{};  // recent values of released_, for their mean
   double gain_ = 1.0;
   double released_ = 1.0;
   double release_ = 0.0;
   double deepest_ = 1.0;
   std::size_t at_ = 0;
-  std::size_t calm_ = 0;  // samples since the last above the ceiling
+  std::size_t calm_ = 0;  // samples since the last one above the ceiling
 };
 
 }  // namespace ressort::engine

@@ -1,4 +1,4 @@
-#include "core/engine/mixing/limiter.h"
+#include "core/engine/limiter.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@ namespace {
 
 constexpr double release_s = 0.08;
 
-// All of them, and all are numbers.
+// Returns whether all samples are numbers and within the ceiling.
 bool are_below(std::span<double* const> channels, std::size_t frames, double ceiling) {
   return std::all_of(channels.begin(), channels.end(), [&](const double* channel) {
     return std::all_of(channel, channel + frames,
@@ -33,7 +33,7 @@ void Limiter::process(std::span<double* const> channels, std::size_t frames) {
   }
 }
 
-// Nobody in flight or on the way in wants another gain than 1.
+// Delays the channels at gain 1. No sample, delayed or new, needs another gain.
 void Limiter::delay(std::span<double* const> channels, std::size_t frames) {
   for (std::size_t n = 0; n < frames;) {
     const std::size_t count = std::min(frames - n, lookahead_frames - at_);
@@ -46,10 +46,10 @@ void Limiter::delay(std::span<double* const> channels, std::size_t frames) {
   calm_ += frames;
 }
 
-// A sample leaves when it is lookahead_frames old. The gain at that moment is the mean of the last
-// lookahead_frames of `released_`, each of which is at most what the sample needs, because
-// `released_` is at most the least gain wanted by any sample in flight. So the peak is met exactly
-// when it arrives, by a straight ramp and not a step.
+// A sample leaves after lookahead_frames. The gain at that moment is the mean of the last
+// lookahead_frames values of `released_`. Each of them is at most the gain that the sample needs,
+// because `released_` never exceeds the least gain wanted by any delayed sample. The gain therefore
+// reaches the peak's value exactly when the peak leaves, by a linear ramp.
 void Limiter::limit(std::span<double* const> channels, std::size_t frames) {
   constexpr double span = static_cast<double>(lookahead_frames);
   for (std::size_t n = 0; n < frames; ++n) {
@@ -63,7 +63,7 @@ void Limiter::limit(std::span<double* const> channels, std::size_t frames) {
     const double wanted = peak > ceiling ? ceiling / peak : 1.0;
     calm_ = peak > ceiling ? 0 : calm_ + 1;
     if (calm_ <= lookahead_frames || released_ < 1.0) {
-      // The sample that leaves now still counts: wanted_[at_] is its.
+      // wanted_[at_] belongs to the sample that leaves now, and it still counts.
       const double least = std::min(wanted, *std::min_element(wanted_.begin(), wanted_.end()));
       released_ = std::min(least, released_ + (1.0 - released_) * release_);
       if (released_ > 0.99999 && least == 1.0) {
@@ -74,8 +74,7 @@ void Limiter::limit(std::span<double* const> channels, std::size_t frames) {
     wanted_[at_] = wanted;
     if (released_ < 1.0 || gain_ < 1.0) {
       smoothed_[at_] = released_;
-      // Added up anew each time: a running sum would keep what the roundings of loud and quiet
-      // left.
+      // The sum is recomputed each time. A running sum would accumulate rounding errors.
       gain_ = std::accumulate(smoothed_.begin(), smoothed_.end(), 0.0) / span;
     }
     for (std::size_t c = 0; c < channels.size(); ++c) {

@@ -1,0 +1,470 @@
+#include "core/engine/keyboard.h"
+
+#include <bit>
+#include <cmath>
+
+#include "core/engine/event.h"
+#include "core/kernels/kernel.h"
+
+namespace ressort::engine {
+namespace {
+
+constexpr double replaced_s = 0.2;     // T60 of a voice whose key is struck again on another voice
+constexpr double release_range = 4.0;  // ratio of T60 at release velocity 0 or 1 to that at 0.5
+
+bool is_on(const Voice& voice, ChannelMask channels) {
+  return has_channel(channels, voice.channel);
+}
+
+}  // namespace
+
+Keyboard::Keyboard(const Playing& playing, double rate_hz, std::size_t outputs)
+    : voices(playing, rate_hz),
+      playing_(playing),
+      rate_hz_(rate_hz),
+      restrikes_(std::none_of(playing.controls.begin(), playing.controls.end(),
+                              [](const Control& control) {
+                                return control.source == Source::note && control.settings.has_level;
+                              })),
+      is_stereo_(outputs > 1),
+      channels_(static_cast<std::uint8_t>(std::countr_zero(playing.channels) %
+                                          static_cast<int>(midi_channel_count))),
+      tuning_(playing, rate_hz) {}
+
+void Keyboard::continue_from(const Keyboard& from) {
+  voices.continue_from(from.voices);
+  channels_ = from.channels_;
+  tuning_.continue_from(from.tuning_);
+  held_keys_ = from.held_keys_;
+  last_hz_ = from.last_hz_;
+  turns_ = from.turns_;
+}
+
+void Keyboard::adopt_channels(const Keyboard& from) {
+  channels_.adopt(from.channels_);
+  tuning_.keys.adopt(from.tuning_.keys);
+  for (std::uint8_t channel = 0; channel < Channels::count; ++channel) {
+    retune(channel);
+    for_each_reached(channel, [&](Voice& voice) {
+      voices.ramp_volume(voice, level_of(voice));
+      damp(voice);
+    });
+  }
+}
+
+// The output of each voice stays continuous: the volume starts at the old gain and ramps.
+void Keyboard::renumber(double gain_ratio) {
+  for (Voice& voice : voices) {
+    if (!voice.awake) {
+      continue;
+    }
+    voices.mark_retuned(voice);
+    if (gain_ratio != 1.0) {
+      for (double& volume : voice.volume) {
+        volume *= gain_ratio;
+      }
+      voices.ramp_volume(voice, level_of(voice));
+    }
+  }
+}
+
+// --- keys ---------------------------------------------------------------------------------------
+
+bool Keyboard::wake(std::size_t lane) {
+  const bool starts = !voices[lane].awake;
+  if (starts) {
+    voices.start(lane, voices[lane].frequency_hz, channels_.semitones(0));
+  }
+  voices[lane].quiet_frames = 0;
+  return starts;
+}
+
+Press Keyboard::press_key(int key, double velocity, std::uint8_t channel, double highest_factor,
+                          double own_hz) {
+  // Fixed tuning has one instrument and one voice; a key only excites it.
+  const bool is_fixed = playing_.tuning == Tuning::fixed;
+  const double note_hz = is_fixed ? 0.0 : tuning_.note_hz(key, own_hz);
+  const double hz = is_fixed ? 0.0 : tuning_.playable_hz(note_hz, highest_factor);
+  if (!is_fixed && hz == 0.0) {
+    return Press::silent;
+  }
+  HeldKeys& held = held_keys_[channel % Channels::count];
+  const bool is_struck = held.is_empty() || !is_legato(channel);
+  const bool glides = !held.is_empty() || !is_legato(channel);
+  held.press(key, velocity, own_hz);
+  Voice* const mono = !is_fixed && is_mono(channel) ? latest_on(channel) : nullptr;
+  if (mono != nullptr && (mono->is_undamped() || (mono->held && !is_struck))) {
+    voices.set_latest(*mono);
+    attach(*mono, key, channel);
+    move_to(*mono, key, own_hz, glides, highest_factor);
+    return is_struck ? Press::strikes : Press::moves;
+  }
+  if (mono != nullptr && mono->held) {
+    replace(*mono);
+  }
+  if (!is_fixed && !restrikes_) {
+    // A repeated key damps its earlier voices, as a finger or hammer touches the same string.
+    for (Voice& voice : voices) {
+      if (voice.is_live() && voice.has_key && voice.key == key && voice.channel == channel) {
+        replace(voice);
+      }
+    }
+  }
+  Voice& latest = voices[voices.latest()];
+  const bool stays = is_fixed && !latest.fading && latest.is_undamped();
+  Voice& voice = stays ? latest : voice_for(key, channel);
+  voices.set_latest(voice);
+  const bool starts = is_fixed ? !voice.is_live() : !is_restruck(voice, key, channel);
+  if (starts) {
+    voices.start(voices.latest(), hz, channels_.semitones(0));
+    voice.key_hz = note_hz;
+    voice.has_own_pitch = own_hz > 0.0;
+  }
+  attach(voice, key, channel);
+  if (starts) {
+    voice.volume = level_of(voice);
+  } else if (!is_fixed) {
+    move_to(voice, key, own_hz, false, highest_factor);
+  }
+  double& before_hz = last_hz_[channel % Channels::count];
+  if (starts && glides && before_hz > 0.0 && !is_fixed) {
+    glide_from(voice, before_hz);
+  }
+  before_hz = hz;
+  return starts ? Press::starts : Press::strikes;
+}
+
+// From now on the voice is held by this key of this channel.
+void Keyboard::attach(Voice& voice, int key, std::uint8_t channel) {
+  voice.has_key = true;
+  voice.key = static_cast<std::uint8_t>(key);
+  voice.channel = channel;
+  voice.turn = ++turns_;
+  voice.held = true;
+  voice.sustained = voice.latched = voice.is_released = false;
+  damp(voice);
+  voice.quiet_frames = 0;
+  if (voice.semitones != channels_.semitones(channel)) {
+    voice.semitones = channels_.semitones(channel);
+    voices.mark_retuned(voice);
+  }
+}
+
+// Returns the voice that already sounds this key, or a lane for a new one.
+Voice& Keyboard::voice_for(int key, std::uint8_t channel) {
+  for (Voice& voice : voices) {
+    if (is_restruck(voice, key, channel)) {
+      return voice;
+    }
+  }
+  return voices.take_lane();
+}
+
+// A repeated key strikes this voice again. A damped voice is left to ring out beside a new one, and
+// so is a voice whose level depends on how hard its key was pressed.
+bool Keyboard::is_restruck(const Voice& voice, int key, std::uint8_t channel) const {
+  return restrikes_ && voice.is_live() && voice.is_undamped() && voice.has_key &&
+         voice.key == key && voice.channel == channel;
+}
+
+Voice* Keyboard::latest_on(std::uint8_t channel) {
+  return voices.least_of(
+      [&](const Voice& voice) {
+        return voice.is_live() && voice.has_key && voice.channel == channel;
+      },
+      [](const Voice& a, const Voice& b) { return a.turn > b.turn; });
+}
+
+std::optional<HeldKey> Keyboard::return_to_held_key(int key, std::uint8_t channel,
+                                                    double highest_factor) {
+  HeldKeys& held = held_keys_[channel % Channels::count];
+  held.release(key);
+  Voice* const voice = latest_on(channel);
+  const std::optional<HeldKey> earlier = held.last();
+  if (playing_.tuning == Tuning::fixed || !is_mono(channel) || !earlier || voice == nullptr ||
+      !voice->held || voice->key != key) {
+    return std::nullopt;
+  }
+  voices.set_latest(*voice);
+  attach(*voice, earlier->key, channel);
+  move_to(*voice, earlier->key, earlier->frequency_hz, true, highest_factor);
+  return earlier;
+}
+
+bool Keyboard::release_key(Voice& voice, int key, std::uint8_t channel, double velocity) const {
+  if (!voice.held || voice.key != key || voice.channel != channel) {
+    return false;
+  }
+  voice.held = false;
+  voice.is_released = true;
+  voice.release_s =
+      playing_.damper_s * std::pow(release_range, 2.0 * (usual_release_velocity - velocity));
+  voice.sustained = voice.latched || channels_.sustains(channel);
+  damp(voice);
+  return !voice.sustained;
+}
+
+void Keyboard::release(Voice& voice) const {
+  voice.held = voice.sustained = voice.latched = false;
+  damp(voice);
+}
+
+// Damps a voice whose key, or whose mono channel, another voice plays from now on.
+void Keyboard::replace(Voice& voice) const {
+  voice.held = voice.sustained = voice.latched = false;
+  voice.is_released = voice.is_replaced = true;
+  voice.release_s = replaced_s;
+  damp(voice);
+}
+
+void Keyboard::damp_keyless(Voice& voice) const {
+  voice.is_released = true;
+  damp(voice);
+}
+
+// Sets the damper by the voice's key and pedals.
+void Keyboard::damp(Voice& voice) const {
+  const bool may_lie = voice.is_released && !voice.latched && playing_.damper_s > 0.0;
+  const double share = voice.is_replaced ? 1.0 : may_lie ? channels_.damper(voice.channel) : 0.0;
+  const bool has_decay = voice.has_key && !playing_.decay_s.empty();
+  voices.damp(voice, share, has_decay ? 1.0 / value_at(playing_.decay_s, voice.key) : 0.0);
+}
+
+void Keyboard::forget_keys(ChannelMask channels) {
+  for (unsigned channel = 0; channel < held_keys_.size(); ++channel) {
+    if (has_channel(channels, channel)) {
+      held_keys_[channel].clear();
+      last_hz_[channel] = 0.0;
+    }
+  }
+}
+
+void Keyboard::panic() {
+  for (Voice& voice : voices) {
+    if (voice.awake) {
+      voices.fade(voice);
+    }
+  }
+  channels_.lift_pedals();
+  forget_keys(all_channels);
+}
+
+void Keyboard::silence(std::uint8_t channel) {
+  for_each_reached(channel, [&](Voice& voice) { voices.fade(voice); });
+}
+
+// --- channels -----------------------------------------------------------------------------------
+
+template <class Use>
+void Keyboard::for_each_reached(std::uint8_t channel, Use&& use) {
+  const ChannelMask reached = channels_.reach(channel);
+  for (Voice& voice : voices) {
+    if (voice.awake && is_on(voice, reached)) {
+      use(voice);
+    }
+  }
+}
+
+Channels::Change Keyboard::turn_controller(std::uint8_t channel, int number, double value) {
+  const bool was_latching = channels_.latches(channel);
+  const ChannelMask reached = channels_.reach(channel);
+  const Channels::Change change = channels_.turn(channel, number, value);
+  switch (change) {
+    case Channels::Change::pitch:
+      retune(channel);
+      break;
+    case Channels::Change::level:
+      for_each_reached(channel, [&](Voice& voice) { voices.ramp_volume(voice, level_of(voice)); });
+      break;
+    case Channels::Change::sostenuto:
+      for (Voice& voice : voices) {
+        if (is_on(voice, reached) && channels_.latches(channel) != was_latching) {
+          voice.latched = !was_latching && voice.held;
+        }
+      }
+      for_each_reached(channel, [&](Voice& voice) { damp(voice); });
+      break;
+    case Channels::Change::zones:
+    case Channels::Change::sustain:
+      for_each_reached(channel, [&](Voice& voice) { damp(voice); });
+      break;
+    case Channels::Change::modulation:
+    case Channels::Change::nothing:
+      break;
+  }
+  return change;
+}
+
+void Keyboard::bend(std::uint8_t channel, double amount) {
+  channels_.bend(channel, std::clamp(amount, -1.0, 1.0));
+  retune(channel);
+}
+
+void Keyboard::reset_controllers(std::uint8_t channel) {
+  channels_.reset(channel);
+  const ChannelMask reached = channels_.reach(channel);
+  for (Voice& voice : voices) {
+    voice.latched &= !is_on(voice, reached);
+  }
+  retune(channel);
+  for_each_reached(channel, [&](Voice& voice) {
+    voices.ramp_volume(voice, level_of(voice));
+    damp(voice);
+  });
+}
+
+bool Keyboard::is_released_by_pedal(const Voice& voice, std::uint8_t channel) const {
+  return voice.sustained && is_on(voice, channels_.reach(channel)) && !voice.latched &&
+         !channels_.sustains(voice.channel);
+}
+
+SideGains Keyboard::level_of(const Voice& voice) const {
+  double level = channels_.level(voice.channel);
+  if (voice.has_key && !playing_.keys_db.empty()) {
+    level *= std::pow(10.0, value_at(playing_.keys_db, voice.key) / 20.0);
+  }
+  const SideGains balance = is_stereo_ ? channels_.balance(voice.channel) : SideGains{1.0, 1.0};
+  return {level * balance[0], level * balance[1]};
+}
+
+void Keyboard::set_strength(Voice& voice, double strength) const {
+  voice.strength = strength;
+  const SideGains level = level_of(voice);
+  if (voice.is_new) {
+    voice.volume = {strength * level[0], strength * level[1]};
+    voice.volume_frames = 0;
+  } else {
+    voices.ramp_volume(voice, level);
+  }
+}
+
+// --- addressing ---------------------------------------------------------------------------------
+
+// Such a scope includes voices without a key. A message to a member of an MPE zone is for that
+// member's note only. With fixed tuning there is one instrument, and every message addresses it.
+bool Keyboard::is_for_all(const Scope& scope) const {
+  return playing_.tuning == Tuning::fixed ||
+         (scope.key == Scope::every_key && (scope.channels & ~channels_.members()) != 0);
+}
+
+bool Keyboard::is_addressed(const Voice& voice, const Scope& scope) const {
+  if (!voice.awake || !voice.has_key || playing_.tuning == Tuning::fixed) {
+    return voice.awake && is_for_all(scope);
+  }
+  const bool was_released = channels_.is_member(voice.channel) && !voice.held && !voice.sustained;
+  const std::uint8_t by = was_released ? channels_.master_of(voice.channel) : voice.channel;
+  return has_channel(scope.channels, by) && (scope.key < 0 || scope.key == voice.key);
+}
+
+std::optional<std::size_t> Keyboard::latest_of(const Scope& scope) const {
+  const Voice& latest = voices[voices.latest()];
+  if (is_addressed(latest, scope) || (!latest.awake && is_for_all(scope))) {
+    return voices.latest();
+  }
+  std::optional<std::size_t> found;
+  for (std::size_t lane = 0; lane < voices.size(); ++lane) {
+    if (voices[lane].is_live() && is_addressed(voices[lane], scope) &&
+        (!found || voices[lane].turn > voices[*found].turn)) {
+      found = lane;
+    }
+  }
+  return found;
+}
+
+// --- tuning -------------------------------------------------------------------------------------
+
+// Moves a sounding voice to another pitch.
+void Keyboard::move_to(Voice& voice, int key, double own_hz, bool glides, double highest_factor) {
+  const double key_hz = tuning_.note_hz(key, own_hz);
+  const double hz = tuning_.playable_hz(key_hz, highest_factor);
+  voice.has_own_pitch = own_hz > 0.0;
+  if (key_hz == voice.key_hz || hz == 0.0) {
+    return;
+  }
+  const double before_hz = voice.frequency_hz * std::exp2(voice.glide / 12.0);
+  voice.key_hz = key_hz;
+  voice.frequency_hz = hz;
+  voice.glide = 0.0;
+  voices.mark_retuned(voice);
+  if (glides) {
+    glide_from(voice, before_hz);
+  }
+  if (!playing_.keys_db.empty()) {
+    voices.ramp_volume(voice, level_of(voice));
+  }
+  last_hz_[voice.channel % Channels::count] = voice.frequency_hz;
+}
+
+void Keyboard::glide_from(Voice& voice, double frequency_hz) const {
+  const double seconds = channels_.glide_s(voice.channel, playing_.glide_s);
+  if (seconds <= 0.0 || playing_.bare) {
+    return;
+  }
+  const double steps = std::max(1.0, seconds * rate_hz_ / static_cast<double>(max_block_frames));
+  voice.glide = 12.0 * std::log2(frequency_hz / voice.frequency_hz);
+  voice.glide_step = std::fabs(voice.glide) / steps;
+}
+
+void Keyboard::retune(std::uint8_t channel) {
+  // A message to one member, such as a bend range, may change the whole zone.
+  const ChannelMask zone = channels_.reach(channels_.master_of(channel));
+  for (Voice& voice : voices) {
+    if (!voice.awake || !is_on(voice, zone)) {
+      continue;
+    }
+    const bool follows = is_addressed(voice, {.channels = channel_bit(voice.channel)});
+    const double semitones = follows ? channels_.semitones(voice.channel) : voice.semitones;
+    if (semitones != voice.semitones || is_on(voice, channels_.reach(channel))) {
+      voice.semitones = semitones;
+      voices.mark_retuned(voice);
+    }
+  }
+}
+
+void Keyboard::retune_key(std::size_t key, double frequency_hz, bool is_now,
+                          double highest_factor) {
+  tuning_.keys.retune(key, frequency_hz);
+  for (Voice& voice : voices) {
+    if (is_now && voice.awake && voice.has_key && voice.key == key && !voice.has_own_pitch &&
+        voice.frequency_hz > 0.0 && frequency_hz > 0.0) {
+      move_to(voice, static_cast<int>(key), 0.0, false, highest_factor);
+    }
+  }
+}
+
+void Keyboard::reset_tuning(double highest_factor) {
+  tuning_.keys.reset();
+  for (Voice& voice : voices) {
+    if (voice.awake && voice.has_key && !voice.has_own_pitch && voice.frequency_hz > 0.0 &&
+        tuning_.keys.frequency_hz(voice.key) > 0.0) {
+      move_to(voice, voice.key, 0.0, false, highest_factor);
+    }
+  }
+}
+
+void Keyboard::set_tuning_parameter(double value) {
+  if (tuning_.set_parameter(value)) {
+    for (Voice& voice : voices) {
+      if (voice.awake) {
+        voices.mark_retuned(voice);
+      }
+    }
+  }
+}
+
+double Keyboard::factor_of(const Voice& voice, double highest_factor) const {
+  return voice.is_new || voice.is_retuned ? tuning_.factor_for(voice, channels_, highest_factor)
+                                          : voice.factor;
+}
+
+void Keyboard::update_factors(bool all, double highest_factor) {
+  for (Voice& voice : voices) {
+    if (voice.awake && (all || voice.is_new || voice.is_retuned)) {
+      const double factor = tuning_.factor_for(voice, channels_, highest_factor);
+      voice.is_retuned |= factor != voice.factor;
+      voice.factor = factor;
+    }
+  }
+}
+
+}  // namespace ressort::engine

@@ -1,0 +1,109 @@
+// core/engine: how an engine plays a Machine, as the compile room decides it. Plain data.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "core/curve.h"
+#include "core/engine/midi/channels.h"
+#include "core/engine/midi/note_share.h"
+#include "core/engine/pitches.h"
+#include "core/gesture.h"
+
+namespace ressort::engine {
+
+enum class Source : std::uint8_t { note, controller, pressure, custom, audio };
+
+// One row of the control map: a source drives an input or a parameter by a gesture.
+struct Control {
+  Source source = Source::note;
+  std::uint16_t number = 0;  // controller 0..127, or audio channel from 0
+  std::uint8_t lowest_key = 0;
+  std::uint8_t highest_key = 127;
+  std::uint8_t turn = 0;   // position in a round robin of notes, from 0
+  std::uint8_t turns = 1;  // number of controls in the round robin
+  Gesture gesture = Gesture::position;
+  std::uint16_t target = 0;  // index into Machine::inputs or Machine::parameters
+  GestureSettings settings;
+};
+
+enum class Tuning : std::uint8_t {
+  fixed,     // every key plays the model at its written pitch
+  keyboard,  // a key's voice has that key's frequency
+};
+
+// The range of a parameter in which the network is stable.
+struct Limits {
+  double lowest = -std::numeric_limits<double>::infinity();
+  double highest = std::numeric_limits<double>::infinity();
+};
+
+// Bounds on the motion of an undriven part. With an energy E, measured from its rest position, an
+// output stays within sqrt(2 E c / s) for ever. c is the output's compliance with every stiffness
+// at the minimum that the box of parameters allows, s the voice's stiffness factor.
+struct RestBound {
+  struct Reach {
+    std::uint32_t link = 0;   // a contact or a pluck
+    double compliance = 0.0;  // of the distance of its ends
+  };
+  std::vector<double> compliances;  // [output]
+  std::vector<Reach> reaches;
+  std::vector<Limits> box;  // [parameter]
+};
+
+// Maps MIDI velocity to strength: a power, or straight lines between points if there are any.
+struct VelocityCurve {
+  std::vector<CurvePoint> points;  // velocity 0..1 and strength, both ascending
+  double exponent = 1.0;
+
+  // [audio] wait-free, O(points)
+  double operator()(double velocity) const {
+    const double v = std::clamp(velocity, 0.0, 1.0);
+    if (points.empty()) {
+      return exponent == 1.0 ? velocity : std::pow(v, exponent);
+    }
+    return value_at(points, v);
+  }
+};
+
+struct Playing {
+  int voices = 1;
+  double gain = 1.0;                // output per unit of position
+  bool bare = false;                // the network alone: no ramps, no smoothing, no sleep
+  double damper_s = 0.0;            // T60 of a released voice; 0: it rings freely
+  std::vector<CurvePoint> decay_s;  // T60 by key, on top of the model's decay; empty: none
+  std::vector<CurvePoint> keys_db;  // gain by key; empty: 0 dB
+  bool noise = false;               // the outputs modulate white noise
+  Tuning tuning = Tuning::fixed;
+  double transpose = 0.0;  // semitones, already included in keys_hz
+  KeyFrequencies keys_hz = equal_temperament(440.0, 0.0);
+  VelocityCurve velocity;
+  ChannelMask channels = midi_channels;  // MIDI channels to listen to
+  bool mono = false;                     // one voice per channel plays the latest held key
+  bool legato = false;                   // a key pressed while another is held is not struck
+  double glide_s = 0.0;                  // portamento time, linear in cents
+  NoteShare::Part share;                 // the notes that this engine plays, of several engines
+  Pitches pitches;                       // of the lowest mode
+  PitchesAlong along;           // replaces `pitches` where a parameter must leave keys in tune
+  double highest_factor = 1.0;  // greatest stiffness factor that is proved stable
+  std::vector<Limits> home;     // [parameter] range in which highest_factor holds; empty: anywhere
+  std::vector<double> away;     // highest_factor at equal steps from `home` to `limits`
+  std::vector<Control> controls;
+  std::vector<Limits> limits;  // [parameter] hard limits for events and audio; empty: none
+  std::vector<std::optional<RestBound>> rest_bounds;  // [part]; nullopt or missing: never frozen
+
+  double gain_of_loudest_key() const {
+    double most_db = 0.0;
+    for (const CurvePoint& point : keys_db) {
+      most_db = std::max(most_db, point[1]);
+    }
+    return gain * std::pow(10.0, most_db / 20.0);
+  }
+};
+
+}  // namespace ressort::engine

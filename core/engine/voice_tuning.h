@@ -1,0 +1,90 @@
+// core/engine: from keys to frequencies to the stiffness factor of a voice.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include "core/engine/playing.h"
+#include "core/engine/voices.h"
+
+namespace ressort::engine {
+
+// The frequency of every key: the preset's scale, changed by MIDI Tuning Standard messages.
+// All functions: [audio] wait-free. A key is 0..127.
+class KeyTuning {
+ public:
+  // `preset_hz` is already transposed by `transpose_semitones`.
+  KeyTuning(const KeyFrequencies& preset_hz, double transpose_semitones)
+      : preset_hz_(preset_hz), ratio_(std::exp2(transpose_semitones / 12.0)) {
+    reset();
+  }
+  double frequency_hz(std::size_t key) const {
+    return retuned_hz_[key] < 0.0 ? preset_hz_[key] : ratio_ * retuned_hz_[key];
+  }
+  // `frequency_hz` is the frequency before transposition.
+  void retune(std::size_t key, double frequency_hz) { retuned_hz_[key] = frequency_hz; }
+  void reset() { retuned_hz_.fill(as_preset); }
+  void adopt(const KeyTuning& from) { retuned_hz_ = from.retuned_hz_; }
+
+ private:
+  static constexpr double as_preset = -1.0;
+  KeyFrequencies preset_hz_;
+  double ratio_;
+  KeyFrequencies retuned_hz_{};
+};
+
+// All functions: [audio] wait-free.
+class VoiceTuning {
+ public:
+  VoiceTuning(const Playing& playing, double rate_hz)
+      : keys(playing.keys_hz, playing.transpose), playing_(playing), rate_hz_(rate_hz) {}
+  void continue_from(const VoiceTuning& from) {
+    keys = from.keys;
+    parameter_ = from.parameter_;
+  }
+
+  // Sets the parameter of Playing::along. Returns whether it has changed.
+  bool set_parameter(double value) {
+    const bool has_changed = value != parameter_;
+    parameter_ = value;
+    return has_changed;
+  }
+  // Returns the frequency of a note: its own, or its key's if `own_hz` is 0.
+  double note_hz(int key, double own_hz) const {
+    return own_hz > 0.0 ? own_hz : keys.frequency_hz(static_cast<std::size_t>(key));
+  }
+  // Returns `hz`, or 0 if the frequency is above Nyquist or needs an unstable stiffness.
+  double playable_hz(double hz, double highest_factor) const {
+    return hz < 0.5 * rate_hz_ && factor_at(hz) <= highest_factor ? hz : 0.0;
+  }
+  // Returns the voice's factor on every stiffness, with bend and glide.
+  double factor_for(const Voice& voice, const Channels& channels, double highest_factor) const {
+    const double bent =
+        std::exp2((voice.semitones + channels.zone_semitones(voice.channel) + voice.glide) / 12.0);
+    const double factor =
+        voice.frequency_hz > 0.0 ? factor_at(voice.frequency_hz * bent) : bent * bent;
+    return std::min(factor, highest_factor);
+  }
+  // Returns the voice's factor as it would be at the initial value of Playing::along's parameter.
+  double initial_factor(const Voice& voice) const {
+    return playing_.along.at.empty() || voice.frequency_hz <= 0.0
+               ? voice.factor
+               : voice.factor * playing_.pitches.factor_at(voice.frequency_hz) /
+                     factor_at(voice.frequency_hz);
+  }
+
+  KeyTuning keys;
+
+ private:
+  double factor_at(double frequency_hz) const {
+    return playing_.along.at.empty() ? playing_.pitches.factor_at(frequency_hz)
+                                     : playing_.along.factor_at(frequency_hz, parameter_);
+  }
+
+  const Playing& playing_;
+  double rate_hz_;
+  double parameter_ = 0.0;
+};
+
+}  // namespace ressort::engine

@@ -1,0 +1,80 @@
+// core: one performance of a gesture, and the numbers that the gesture gives to an input's driver.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace ressort {
+
+// The settings of a preset's control that a gesture uses.
+struct GestureSettings {
+  double low = 0.0;  // the amount 0..1 is mapped to low..high: positions, forces, speeds per sample
+  double high = 1.0;         // at 44 100 Hz, or parameter values
+  bool exponential = false;  // equal steps are equal ratios
+  double travel = 0.0;       // pluck, swing: distance of the finger or mallet from its middle
+  bool has_level = false;    // the amount also sets the voice's level, from low_db to high_db
+  double low_db = 0.0;
+  double high_db = 0.0;
+  double longest_s = 0.0;  // impulse, swing: duration of the softest pulse; 0: one sample
+  double shortest_s = 0.0;
+};
+
+struct Stroke {
+  double amount = 1.0;  // 0..1 of a preset's source, or the first argument of a live call
+  double second = 0.0;  // second argument of a live call
+  bool is_live = false;
+  bool has_control = false;  // a live call may have none
+  GestureSettings settings;  // of the preset's control
+  // The input and the voice.
+  bool is_force = false;
+  double middle = 0.0;      // position of the input in the model; 0 for a force
+  double rate_ratio = 1.0;  // 44 100 Hz to the engine's rate
+  double rate_hz = 44100.0;
+  double pitch = 1.0;  // ratio of the voice's pitch to the written pitch
+  bool bare = false;   // nothing is smoothed
+  // Results, set by the gesture.
+  std::optional<double> rest;      // position at which drivers of new voices start from now on
+  std::optional<double> pressure;  // channel pressure to apply
+  std::optional<double> loudness;  // factor on the highest level, in place of the amount
+
+  // Returns the amount mapped to the control's range. Without a control it is used unchanged.
+  double mapped() const {
+    if (!has_control) {
+      return amount;
+    }
+    const double low = settings.low;
+    const double high = settings.high;
+    const double a = std::clamp(amount, 0.0, 1.0);
+    return settings.exponential && low * high > 0.0 ? low * std::pow(high / low, a)
+                                                    : low + (high - low) * a;
+  }
+  // Returns the voice's level as a factor.
+  double level() const {
+    const double part = loudness ? 1.0 : std::clamp(amount, 0.0, 1.0);
+    const double db = settings.low_db + (settings.high_db - settings.low_db) * part;
+    return std::pow(10.0, db / 20.0) * loudness.value_or(1.0);
+  }
+  // Returns the duration of a blow. It shrinks in equal ratios from soft to hard, and in proportion
+  // to the period of a higher key, so that all keys have the same timbre.
+  double pulse_frames() const {
+    const double longest_s = settings.longest_s;
+    const double shortest_s = settings.shortest_s;
+    const double a = std::clamp(amount, 0.0, 1.0);
+    const double s = longest_s > 0.0 && shortest_s > 0.0
+                         ? longest_s * std::pow(shortest_s / longest_s, a)
+                         : longest_s + (shortest_s - longest_s) * a;
+    return s * rate_hz / pitch;
+  }
+  // Scales a speed or an impulse for the same displacement at every rate and pitch.
+  double paced(double value) const { return value * rate_ratio * pitch; }
+  // Scales the force of a blow, or the displacement that gives the same blow through a spring.
+  double struck(double value) const {
+    return is_force ? paced(value) : value / (rate_ratio * pitch);
+  }
+  // Poles of the one-pole filters that smooth a position (44.1 Hz / rate) and a speed (5 ms).
+  double pole_of_position() const { return bare ? 0.0 : 1.0 - std::min(1.0, 44.1 / rate_hz); }
+  double pole_of_speed() const { return bare ? 0.0 : std::exp(-1.0 / (0.005 * rate_hz)); }
+};
+
+}  // namespace ressort
