@@ -193,7 +193,7 @@ class Chooser {
     }
   }
 
-  // Whether another form than the first in rank may be taken.
+  // Returns whether another form than the first in rank may be taken.
   bool is_open() const { return timings_ != nullptr || !recorded_.empty(); }
 
   // Modes below the budget of silence are not stepped, on average half of them.
@@ -201,7 +201,7 @@ class Chooser {
     return method == Method::modal && budget_.silence_db > -Budget::unlimited ? 0.5 : 1.0;
   }
 
-  // Whether a form that takes long to compute may be the cheapest.
+  // Returns whether a form that takes long to compute may be the cheapest.
   bool may_pay(const KernelRow& row) {
     const double behind = is_open() ? most_behind : 1.0;
     const bool pays = eigenvectors_of_ <= patient_modes && program_.moving > 4 &&
@@ -221,7 +221,8 @@ class Chooser {
     return true;
   }
 
-  // How many times a budget is exceeded, 1 if it is kept; unlimited if the error is not known.
+  // Returns the factor by which the budget is exceeded: 1 if it is kept, unlimited if the error is
+  // not known.
   double excess(const Candidate& c) const {
     return judge_ == nullptr      ? 1.0
            : !c.accuracy.is_known ? Budget::unlimited

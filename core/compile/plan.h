@@ -67,7 +67,7 @@ struct Promise {
   Accuracy merged;
 };
 
-// What the choice among the forms of a part goes by, besides their estimates.
+// Inputs of the choice among the forms of a part, besides their estimates.
 struct Choice {
   const Timings* timings = nullptr;  // null: the estimates alone, the same on every machine
   // [moving part] Part::form of an earlier plan, which is repeated; empty: nothing is repeated. A
