@@ -25,7 +25,7 @@ namespace {
 
 using nlohmann::json;
 
-void tell(const std::vector<Finding>& findings) {
+void print_findings(const std::vector<Finding>& findings) {
   const bool is_terminal = isatty(STDERR_FILENO) != 0;
   for (const Finding& finding : findings) {
     const std::string text = is_terminal ? with_source(finding) : to_string(finding);
@@ -307,7 +307,7 @@ int check(const CheckOptions& options) {
     // Names may have any encoding; invalid UTF-8 is replaced.
     std::printf("%s\n", out.dump(2, ' ', false, json::error_handler_t::replace).c_str());
   } else {
-    tell(reading.findings);
+    print_findings(reading.findings);
   }
   if (!compiled) {
     return exit_code::wrong_use;

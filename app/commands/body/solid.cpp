@@ -220,8 +220,8 @@ std::string body_text(const std::string& name, const std::string& story, const S
   return text;
 }
 
-std::string story_of(const SolidBodyOptions& options, const MaterialChoice& choice,
-                     const SolidMesh& mesh, const SolidModes& modes, const std::string& by) {
+std::string header_comment(const SolidBodyOptions& options, const MaterialChoice& choice,
+                           const SolidMesh& mesh, const SolidModes& modes, const std::string& by) {
   const SolidMaterial& material = choice.material;
   const std::string what = material.name.empty() ? "" : std::string(material.name) + ", ";
   const std::string loss = options.rayleigh ? "Rayleigh damping " + digits(choice.damping.a, 4) +
@@ -347,9 +347,9 @@ int solid_body(const SolidBodyOptions& options) {
     if (!modes) {
       return failed(Error{options.input + ": error: " + modes.error().message});
     }
-    const std::string story = story_of(options, *choice, *mesh, *modes, meshed->by);
+    const std::string header = header_comment(options, *choice, *mesh, *modes, meshed->by);
     const std::string text =
-        body_text(body_name(options.input), story, *mesh, *modes, *places, choice->damping);
+        body_text(body_name(options.input), header, *mesh, *modes, *places, choice->damping);
     if (!options.picture.empty()) {
       const std::string title = std::filesystem::path(options.input).filename().string() + ", " +
                                 digits(modes->mass, 4) + " kg";

@@ -83,12 +83,12 @@ struct Take {
   Sound sound;
 };
 
-using GoesOn = std::function<bool()>;
+using ShouldContinue = std::function<bool()>;
 
 // Renders notes to a file and reads the file.
 Result<Take> play_notes(const GalleryOptions& options, const std::string& preset,
                         const std::string& file, const std::vector<PhraseNote>& notes,
-                        double length_s, int voices, const GoesOn& goes_on) {
+                        double length_s, int voices, const ShouldContinue& goes_on) {
   const std::string path = (std::filesystem::path(options.folder) / file).string();
   auto rendered = render({.name = preset,
                           .output = path,
@@ -136,7 +136,8 @@ std::vector<double> peaks_of(const Sound& sound, Stretch from_start, std::size_t
   return peaks;
 }
 
-ShownPreset show(const GalleryOptions& options, const std::string& name, const GoesOn& goes_on) {
+ShownPreset show(const GalleryOptions& options, const std::string& name,
+                 const ShouldContinue& goes_on) {
   ShownPreset shown{.name = name};
   const auto scene = load_scene(name, {});
   if (!scene) {
@@ -187,7 +188,8 @@ std::string today() {
 
 // Plays all presets, one thread per core.
 std::vector<ShownPreset> show_all(const GalleryOptions& options,
-                                  const std::vector<std::string>& names, const GoesOn& goes_on) {
+                                  const std::vector<std::string>& names,
+                                  const ShouldContinue& goes_on) {
   std::vector<ShownPreset> shown(names.size());
   ProgressBar bar(!options.is_quiet);
   std::mutex mutex;  // guards the next two and the bar
@@ -223,7 +225,7 @@ std::vector<ShownPreset> show_all(const GalleryOptions& options,
 
 }  // namespace
 
-int gallery(const GalleryOptions& options, const GoesOn& goes_on) {
+int gallery(const GalleryOptions& options, const ShouldContinue& goes_on) {
   const std::vector<std::string> names = known_presets();
   if (names.empty()) {
     return reject("no presets found beside '" + models_folder() + "'");

@@ -45,7 +45,7 @@ Result<Done> tune(Scene& scene, const std::vector<double>& parameters, const Mod
   return Done{};
 }
 
-void tell(const Scene& scene, const KnownModes& modes) {
+void print_modes(const Scene& scene, const KnownModes& modes) {
   std::printf("%s: %s%s of %s, %s\n", scene.path.c_str(), modes.is_all ? "" : "the lowest ",
               counted(modes.modes.size(), "mode", "modes").c_str(),
               counted(modes.masses, "mass that moves", "masses that move").c_str(),
@@ -128,7 +128,7 @@ int modes_command(const ModesOptions& options) {
   if (options.as_json) {
     std::printf("%s\n", to_json(*modes).c_str());
   } else {
-    tell(*scene, *modes);
+    print_modes(*scene, *modes);
   }
   return exit_code::done;
 }

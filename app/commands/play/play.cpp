@@ -116,7 +116,7 @@ class Player {
                                                  .keeps_flights = true,
                                                  .time = cpu_time_ns,
                                                  .wisdom_path = wisdom_path()},
-                                  [this](const std::string& news) { tell(news); });
+                                  [this](const std::string& news) { report(news); });
     connect_session();
     if (options_.panel.port != 0) {
       session_->on_engine([this](Engine& engine, const Network& network) {
@@ -364,7 +364,7 @@ class Player {
 
   // Plays on without OSC if the port is taken.
   void open_osc() {
-    const auto hear = [this](const std::string& news) { tell(news); };
+    const auto hear = [this](const std::string& news) { report(news); };
     if (options_.osc.port != 0) {
       auto osc = OscServer::open(options_.osc, process_, *session_, hear);
       if (osc) {
@@ -404,7 +404,7 @@ class Player {
   }
 
   // On any thread.
-  void tell(const std::string& news) {
+  void report(const std::string& news) {
     voice_.say(news);
     const std::lock_guard lock(panel_mutex_);
     if (panel_) {

@@ -179,9 +179,9 @@ int sweep(const DescribeOptions& options, const std::function<bool()>& goes_on) 
       return reject("--sweep: more than " + std::to_string(most_steps) + " sounds");
     }
   }
-  std::set<std::string> told;
-  const auto tell = [&](const std::string& text) {
-    if (told.insert(text).second) {
+  std::set<std::string> printed;
+  const auto warn_once = [&](const std::string& text) {
+    if (printed.insert(text).second) {
       std::fprintf(stderr, "%s\n", text.c_str());
     }
   };
@@ -201,7 +201,7 @@ int sweep(const DescribeOptions& options, const std::function<bool()>& goes_on) 
             bar.show((done + share) / static_cast<double>(count), options.name + place);
             return goes_on();
           },
-          tell);
+          warn_once);
       if (!goes_on()) {
         break;
       }
@@ -209,7 +209,7 @@ int sweep(const DescribeOptions& options, const std::function<bool()>& goes_on) 
         return reject(description.error().message);
       }
       if (!description) {
-        tell(place.substr(1) + ": " + description.error().message);
+        warn_once(place.substr(1) + ": " + description.error().message);
       }
       table.rows.push_back({at, description
                                     ? figures_of(*description, options.how.at.has_value())
