@@ -397,20 +397,4 @@ std::optional<Continuous> solve_continuous(const Network& network,
   return Solver(network, body).solve();
 }
 
-std::vector<std::complex<double>> factors_between(const std::vector<std::vector<double>>& before,
-                                                  const std::vector<std::vector<double>>& after) {
-  const std::size_t n = before.size();
-  Matrix from(n, n);
-  Matrix to(n, n);
-  for (std::size_t c = 0; c < n; ++c) {
-    for (std::size_t i = 0; i < n; ++i) {
-      from(i, c) = before[c][i];
-      to(i, c) = after[c][i];
-    }
-  }
-  const std::optional<Matrix> step = quotient(to, from);
-  return step && std::isfinite(step->values.sum()) ? eigenvalues(*step)
-                                                   : std::vector<std::complex<double>>();
-}
-
 }  // namespace ressort::analysis

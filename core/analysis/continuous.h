@@ -56,9 +56,4 @@ inline constexpr std::size_t most_crossed_modes = 400;  // The same for non-prop
 std::optional<Continuous> solve_continuous(const Network& network,
                                            std::span<const double> parameters);
 
-// Returns the eigenvalues of the linear map that takes each column of `before` to the same column
-// of `after`: [column][row], both n by n. Empty if `before` is singular.
-std::vector<std::complex<double>> factors_between(const std::vector<std::vector<double>>& before,
-                                                  const std::vector<std::vector<double>>& after);
-
 }  // namespace ressort::analysis

@@ -92,10 +92,6 @@ constexpr KernelRow rows[] = {
 
 }  // namespace
 
-std::span<const KernelRow> kernel_rows() {
-  return rows;
-}
-
 const KernelRow& row_of(const Form& form) {
   return *std::find_if(std::begin(rows), std::end(rows),
                        [&](const KernelRow& row) { return row.kind == form.kind(); });

@@ -55,9 +55,6 @@ struct KernelRow {
   std::unique_ptr<Kernel<double>> (*make_double)(const Program&, std::size_t voices, Isa);
 };
 
-// Returns all rows. The last is the reference, which can play every Program.
-std::span<const KernelRow> kernel_rows();
-
 const KernelRow& row_of(const Form& form);
 const KernelRow& row_of(Method method);
 std::string_view method_name(Method method);
