@@ -14,7 +14,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t most_bytes = std::size_t{4} << 20;
+constexpr std::size_t most_file_bytes = std::size_t{4} << 20;
 constexpr std::size_t most_entries = 20'000;  // more, and only those of this run stay
 
 std::string cpu_name() {
@@ -34,7 +34,7 @@ std::string digest_of(const std::string& key) {
 
 std::map<std::string, double> read_entries(const std::string& path) {
   std::map<std::string, double> entries;
-  const auto text = read_text(path, most_bytes);
+  const auto text = read_text(path, most_file_bytes);
   const json read = text ? json::parse(*text, nullptr, false) : json();
   if (!read.is_object()) {
     return entries;
