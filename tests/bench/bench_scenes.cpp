@@ -43,7 +43,7 @@ Hand lean(double reach) {
   };
 }
 
-// Moves down and up at a constant speed per sample.
+// Moves back and forth at a constant speed per sample.
 Hand draw(double speed) {
   return [=](std::size_t, std::size_t frame) {
     const std::size_t half = cycle_frames / 2;
@@ -192,8 +192,8 @@ void add_families(std::vector<BenchScene>& all) {
   }
 }
 
-// Returns whether everything that can touch touches all the time. Other scenes are struck once or
-// touched now and then, which is cheap for a few masses.
+// Returns whether everything that can touch touches all the time. In the other scenes contacts are
+// short or rare, which is cheap for a few masses.
 bool is_worst(const std::string& name) {
   const auto starts = [&](const char* text) { return name.starts_with(text); };
   return name.ends_with("-contact") || (starts("IPlay") && name.ends_with("voices")) ||

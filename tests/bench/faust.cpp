@@ -92,7 +92,7 @@ Outcome outcome_of(const std::string& command) {
   return is_interrupted ? Outcome::interrupted : Outcome::failed;
 }
 
-// A program, by its file name without an extension.
+// A program, by its file name without extension.
 struct Source {
   const char* prefix;  // in printed names
   bool is_export;

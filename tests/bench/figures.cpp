@@ -51,20 +51,20 @@ std::string style_of(const Curve& curve) {
          (curve.method == "ressort" ? "2.5" : "1.2") + " dt " + (curve.is_double ? "1" : "2");
 }
 
-// A mark of the figure beside FAUST.
+// A kind of marker in the comparison with FAUST.
 struct Kind {
   const char* name;
   bool is_engine;
   bool is_double;
   const char* colour;
-  double above;  // the middle of a scene's line, in lines
+  double above;  // vertical offset from the middle of the scene's line, in lines
 };
 constexpr std::array<Kind, 4> kinds{{{"kernel, double", false, true, "#4a90d9", 0.28},
                                      {"engine, double", true, true, "#14508c", 0.1},
                                      {"kernel, float", false, false, "#f0a050", -0.1},
                                      {"engine, float", true, false, "#b35900", -0.28}}};
 
-// The row of the engine, or of the kernel that it plays.
+// Returns the row of the engine, or of the kernel that the engine plays.
 const Row* row_of(const Kind& kind, const std::string& scene, const std::vector<Row>& rows) {
   const auto find = [&](const std::string& method) -> const Row* {
     const auto row = std::find_if(rows.begin(), rows.end(), [&](const Row& known) {

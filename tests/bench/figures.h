@@ -1,4 +1,4 @@
-// bench: the figures of what was measured.
+// bench: draws the figures of the measurements.
 #pragma once
 
 #include <string>
@@ -9,13 +9,13 @@
 
 namespace ressort::bench {
 
-// Cost per mass against the number of masses, of chains and of meshes. Without panels where no such
-// scene was measured.
+// Draws the cost per mass against the number of masses, for chains and for meshes. The figure has
+// no panels if no such scene was measured.
 plot::Figure cost_figure(const std::string& machine, const std::vector<Row>& rows);
 
-// Speed of each scene relative to the best of FAUST: the kernel of the plan's choice and
-// the engine around it, in double and in float, with a bar from one quartile of the rounds to the
-// other. Without panels where FAUST played nothing.
+// Draws the speed of each scene relative to FAUST's best variant, for the kernel that the plan
+// chose and for the whole engine, in double and in float. Bars join the quartiles of the rounds.
+// The figure has no panels if FAUST played nothing.
 plot::Figure faust_figure(const std::string& machine, const std::vector<Row>& rows);
 
 }  // namespace ressort::bench

@@ -17,7 +17,7 @@
 namespace ressort::bench {
 namespace {
 
-constexpr std::size_t chains = 12;  // that do not wait for each other: the latency is hidden
+constexpr std::size_t chains = 12;  // independent chains, which hide the latency
 constexpr std::size_t turns = 20'000;
 
 // Inlined into functions for each instruction set.
@@ -70,7 +70,8 @@ double fastest(Isa isa) {
   return best;
 }
 
-// d -= K q + Z d; q += d; and one for each place that is heard. Nothing pushes most of the time.
+// Per mode: d -= K q + Z d; q += d. Plus one multiply-add for each output place. Most of the time
+// no force acts.
 std::optional<double> multiply_adds_of(const Modes& form) {
   if (!form.places.empty()) {
     return std::nullopt;
@@ -78,7 +79,7 @@ std::optional<double> multiply_adds_of(const Modes& form) {
   return form.modes * (3.0 + static_cast<double>(form.outputs.size()));
 }
 
-// y = K x + Z v; the sum over the offsets; v += w sum; x += v.
+// Per mass: y = K x + Z v, the sum over the offsets, v += w sum, x += v.
 std::optional<double> multiply_adds_of(const Grid& form) {
   if (form.segments.empty()) {
     return std::nullopt;

@@ -13,8 +13,8 @@ namespace ressort::bench {
 // multiplication and an addition.
 double multiply_adds_per_ns(Isa isa, bool is_double);
 
-// Returns the multiply-adds of the form for a sample of one voice if nothing touches, without
-// memory accesses. Nothing for forms whose count is not known.
+// Returns the multiply-adds of the form for one sample of one voice without contacts, not counting
+// memory accesses. Returns nothing for forms whose count is unknown.
 std::optional<double> multiply_adds(const Program& program);
 
 }  // namespace ressort::bench

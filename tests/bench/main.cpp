@@ -1,6 +1,5 @@
-// Measures the cost of every scene in every method and precision, beside a textbook simulator and,
-// with
-// --faust, beside FAUST's code for the same model. See `run --help`.
+// Measures the cost of every scene in every method and precision, next to a textbook simulator and,
+// with --faust, next to FAUST's code for the same model. See `run --help`.
 #include <fnmatch.h>
 #include <unistd.h>
 
@@ -132,7 +131,7 @@ void draw(const plot::Figure& figure, const std::filesystem::path& path) {
 
 // --- one scene ----------------------------------------------------------------------------------
 
-// Returns the machine in every form that it has.
+// Returns every form that the machine can have.
 std::vector<Formed> forms_of(const Machine& machine) {
   std::vector<Formed> forms;
   for (const Method method : methods_for(KernelRow::Use::published)) {
@@ -158,7 +157,7 @@ void add_ours(const BenchScene& scene, const Network& network, const std::vector
     kernels.back().calibrate();
   }
   const Precision precision = is_double ? Precision::float64 : Precision::float32;
-  // The plan of `play` after it has measured the forms.
+  // The plan that `play` makes once it has measured the forms.
   const Timings timings{.time = time_of, .recall = {}, .keep = {}};
   const Planned planned =
       make_plan(forms.front().machine,
@@ -175,7 +174,7 @@ std::string faust_name(const FaustLibrary& library) {
   return "faust " + library.variant;
 }
 
-// Fills the row's speed ratios to all others of the same scene.
+// Fills in the row's speed ratios to all other players of the same scene.
 void compare(Row& row, const std::vector<Timed>& all, const std::vector<FaustLibrary>& libraries) {
   for (const Timed& one : all) {
     if (one.method == "reference") {

@@ -9,9 +9,9 @@
 namespace ressort::bench {
 namespace {
 
-constexpr double longest_cycle_ns = 60e6;  // a longer cycle is not played as a whole
+constexpr double longest_cycle_ns = 60e6;  // A longer cycle is not played as a whole.
 constexpr double round_ns = 2e6;
-constexpr double long_round_ns = 10e6;  // if a cycle is too long
+constexpr double long_round_ns = 10e6;  // Length of a round if a cycle is too long.
 constexpr std::size_t least_rounds = 3;
 constexpr std::size_t most_rounds = 400;
 

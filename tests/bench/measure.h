@@ -1,4 +1,4 @@
-// bench: measures players in turns, in CPU time of this thread.
+// bench: measures players in turn, in CPU time of this thread.
 #pragma once
 
 #include <algorithm>
@@ -17,8 +17,8 @@ class Timed {
  public:
   Timed(std::string method_in, bool is_double_in, std::unique_ptr<Player> player);
 
-  // Measures the player briefly, returns ns per sample, and chooses how much it plays in a round:
-  // whole cycles if they are short, else a few blocks.
+  // Measures the player briefly, returns ns per sample, and sets the length of a round: whole
+  // cycles if they are short, otherwise a few blocks.
   double calibrate();
   void play_round();
 
@@ -29,14 +29,14 @@ class Timed {
   double minimum() const;
 
   std::string method;
-  std::string form;  // that an engine plays, for printing
+  std::string form;  // form that the engine plays, for printing
   bool is_double;
 
  private:
   double play(std::size_t blocks);
   std::unique_ptr<Player> player_;
-  std::size_t blocks_ = 1;  // in a round
-  std::size_t next_ = 0;    // block of the cycle
+  std::size_t blocks_ = 1;  // blocks in a round
+  std::size_t next_ = 0;  // next block of the cycle
   std::vector<double> took_;
 };
 

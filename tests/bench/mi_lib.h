@@ -11,8 +11,8 @@ namespace ressort::bench {
 
 // Returns a FAUST program in the form of mi.lib's loop: masses, links, masses again. `process`
 // takes in1, in2, ... and returns out1, out2, ...; parameters are sliders of the same names.
-// Empty for macros, bodies, waveguides, force outputs, laws that mi.lib lacks, and masses whose
-// numbers are driven by audio.
+// Returns nothing for networks with macros, bodies, waveguides, force outputs, laws that mi.lib
+// lacks, or masses whose numbers are driven by audio.
 std::optional<std::string> mi_lib_text(const Network& network);
 
 }  // namespace ressort::bench

@@ -10,10 +10,11 @@
 namespace ressort::bench {
 namespace {
 
-constexpr std::size_t ramp_frames = 882;  // of a parameter, as in the engine at 44 100 Hz
+// ramp length of a parameter, as in the engine at 44,100 Hz
+constexpr std::size_t ramp_frames = 882;
 static_assert(block_frames <= max_block_frames && ramp_frames > block_frames);
 
-// Returns the stiffness factor of one voice of many.
+// Returns the stiffness factor of one of several voices.
 double pitch(const BenchScene& scene, std::size_t voice) {
   return 1.0 + 0.5 * static_cast<double>(voice) / static_cast<double>(scene.voices);
 }
@@ -47,7 +48,7 @@ class KernelPlayer : public Player {
     outputs_.resize(block_frames * program_.outputs.size() * width_);
   }
 
-  // All coefficients of a moving parameter ramp all the time and never reach their targets.
+  // Ramps all coefficients of a moving parameter all the time; they never reach their targets.
   void move(std::vector<std::uint32_t> parameters, const BenchScene& scene) {
     for (const std::uint32_t parameter : parameters) {
       const auto& depending = program_.depending[parameter];
@@ -163,8 +164,8 @@ class EnginePlayer : public Player {
     return playing;
   }
 
-  // A held voice never sleeps. The voice that an engine starts with falls asleep first if it is at
-  // rest, so that exactly the held keys are stepped.
+  // A held voice never sleeps. The engine's initial voice falls asleep first if it is at rest, so
+  // that only the held keys are stepped.
   void hold_keys(std::size_t voices) {
     for (std::size_t block = 0; block < 1000 && engine_.meters().stepped > 0; ++block) {
       engine_.process({}, {}, output_pointers_, block_frames);

@@ -8,7 +8,7 @@
 namespace ressort::bench {
 namespace {
 
-constexpr double budget_ns = 1e9 / 48000.0;  // of one core per sample
+constexpr double budget_ns = 1e9 / 48000.0;  // time per sample of one core
 
 const char* precision_of(const Row& row) {
   return row.is_double ? "double" : "float";

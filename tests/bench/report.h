@@ -16,29 +16,30 @@ struct Row {
   std::string method;
   std::string form;  // the kernel that an engine plays; else empty
   bool is_double = true;
-  std::size_t masses = 0;  // that move, in one voice
+  std::size_t masses = 0;  // moving masses of one voice
   std::size_t links = 0;
   std::size_t voices = 1;
-  bool is_worst = false;   // of the scene
+  bool is_worst = false;  // of the scene
   double median_ns = 0.0;  // per sample
   double minimum_ns = 0.0;
   double lower_ns = 0.0;  // quartiles of the rounds
   double upper_ns = 0.0;
-  // Ratios of medians: how many times faster it is than others in the same run.
+  // Ratios of medians: how many times faster this row is than others in the same run.
   std::optional<double> than_reference;
   std::optional<double> than_best_faust;  // in the same precision
   std::optional<double> than_default_faust;
-  // Share of the time that the multiply-adds alone would take at the core's peak rate.
+  // Ratio of the time that the multiply-adds alone would take at the core's peak rate to the
+  // measured time.
   std::optional<double> of_limit;
 };
 
-// Returns CPU, instruction set and compiler.
+// Returns the CPU, the instruction set and the compiler.
 std::string machine_line(const std::string& isa);
 
 void print_head();
 void print(const std::vector<Row>& rows);
-// Prints the scenes in which another kernel is more than a tenth faster than the one that the plan
-// chose for its worst case, and the largest loss.
+// Prints the scenes in which another kernel is more than a tenth faster than the kernel that the
+// plan chose for its worst case, and the largest loss.
 void print_regrets(const std::vector<Row>& rows);
 bool write_csv(const std::filesystem::path& path, const std::string& isa,
                const std::vector<Row>& rows);

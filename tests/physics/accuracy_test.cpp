@@ -268,7 +268,7 @@ bool are_near(const Poles& wanted, const Poles& found, double cents, double t60_
     near.emplace_back();
     for (std::size_t j = 0; j < found.size(); ++j) {
       const double pitch = std::fabs(1200.0 * std::log2(found[j].imag() / s.imag()));
-      // Without damping, only rounding errors decay.
+      // Without damping, rounding errors are the only decay.
       const double decay = -s.real() < 1e-7 && -found[j].real() < 2e-7
                                ? 0.0
                                : std::fabs(100.0 * (s.real() / found[j].real() - 1.0));
@@ -359,7 +359,7 @@ void judge_all(std::uint64_t first, std::size_t count) {
         tally.published);
     CHECK(tally.silent == 0);
     CHECK(tally.wrong_figure == 0);
-    // The test needs networks that the published scheme fails on.
+    // The test needs networks on which the published scheme fails.
     CHECK(tally.published > 0);
   }
 }
@@ -403,7 +403,7 @@ TEST_CASE("A budget holds over the whole range of a parameter", "[accuracy]") {
   CHECK(plan_of(text, preset, budget).accuracy->cents < 1.0);
 }
 
-// Returns the frequency of 3000 samples of an oscillation, from the crossings of its mean.
+// Returns the frequency of 3000 samples of an oscillation, from the crossings of its mean value.
 double oscillation_hz(std::span<const double> y) {
   const double mean = std::accumulate(y.begin(), y.end(), 0.0) / static_cast<double>(y.size());
   std::vector<double> crossings;
@@ -488,7 +488,7 @@ TEST_CASE("A budget is not reported as kept if the error is unknown", "[accuracy
   const Plan proportional = plan_for(mesh);
   REQUIRE(proportional.accuracy);
   CHECK(proportional.accuracy->is_known);
-  CHECK(proportional.accuracy->is_bound);  // by how stiff a mode may be at most
+  CHECK(proportional.accuracy->is_bound);  // limited by the stiffness of the fastest mode
   CHECK_FALSE(broken_promise(proportional));
   const Plan crossed = plan_for(mesh + "@g ground 0.\n@d springDamper @g [@m 0.2 0.3] 0. 0.02\n");
   REQUIRE(crossed.accuracy);

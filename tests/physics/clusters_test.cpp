@@ -16,7 +16,7 @@ long double held(Law law, const LawNumbers& c, long double d) {
     if (c[1] == 0.0 || c[0] >= c[2]) {
       return (c[1] == 0.0 ? c[0] : c[2]) / 2.0L * u * u;
     }
-    const long double edge = (c[2] - c[0]) / c[1];  // Squared.
+    const long double edge = (c[2] - c[0]) / c[1];  // squared
     const long double bent = std::min(u * u, edge);
     return c[0] / 2.0L * bent + c[1] / 4.0L * bent * bent + c[2] / 2.0L * (u * u - bent);
   };
@@ -74,8 +74,8 @@ class EnergyJudge {
         links_.push_back({run.law, numbers, program.ends[i]});
       }
     }
-    // The initial energy from the text: kinetic energy, and potentials at the start or one sample
-    // earlier, whichever is larger.
+    // The initial energy from the text: kinetic energy, and the potentials at the start or one
+    // sample earlier, whichever are larger.
     for (std::size_t i = 0; i < mass_.size(); ++i) {
       start += mass_[i] / 2.0L * v_[i] * v_[i];
     }
@@ -114,7 +114,8 @@ class EnergyJudge {
       const long double straight =
           linear(Role::stiffness) / 2.0L * there * d - linear(Role::damping) / 4.0L * speed * speed;
       energy += straight;
-      // Linear links exert no force in the first sample, and their usual one from the second.
+      // Linear links exert no force in the first sample, and their normal force from the second
+      // sample on.
       start += is_first_ ? straight : 0.0L;
     }
     is_first_ = false;
@@ -133,7 +134,7 @@ class EnergyJudge {
   long double work = 0.0L;
   long double passed = 0.0L;
   long double energy = 0.0L;
-  double excess = 0.0;  // Largest surplus so far, relative to the energy that passed through.
+  double excess = 0.0;  // Largest surplus so far, relative to the total energy exchanged.
   bool is_finite = true;
 
  private:
@@ -251,8 +252,8 @@ TEST_CASE("no cluster of links has more energy than was put in", "[clusters]") {
   int exploded = 0;
   std::vector<std::uint64_t> seeds(120);
   std::iota(seeds.begin(), seeds.end(), 1);
-  // Seeds out of 3000 that once gained energy: masses that start at rest on a slope; links that are
-  // much stiffer than their mass is heavy; a strike after which forces are 1e16 times their sum.
+  // Seeds below 3000 that once gained energy: masses that start at rest on a slope; links far too
+  // stiff for their mass; a strike after which the forces are 1e16 times their sum.
   seeds.insert(seeds.end(), {399, 834, 907, 1275, 2026, 2120, 2136});
   for (const std::uint64_t seed : seeds) {
     INFO("seed " << seed << "\n" << any_cluster(seed));
@@ -266,8 +267,8 @@ TEST_CASE("no cluster of links has more energy than was put in", "[clusters]") {
 }
 
 TEST_CASE("lossless networks conserve energy with any number of links at a mass", "[clusters]") {
-  // Every mass linked by a law to every other and to a wall; chains; Newton's cradles whose balls
-  // touch at the start. The start must not lose energy either: within a thousandth of the initial
+  // Networks in which a law links every mass to every other and to a wall; chains; Newton's cradles
+  // whose balls touch at the start. The start must not lose more than a thousandth of the initial
   // energy.
   const auto all_to_all = [](const std::string& law, std::size_t masses) {
     std::string text = "~motion velocity\n@g ground 0.\n";

@@ -80,7 +80,8 @@ void check_forms(Program program, const Score& score, const std::vector<Isa>& is
 }
 
 // A bow's force is discontinuous in its profile parameter, and must switch on the same sample in
-// every kernel. Changes take 128 samples, as everywhere, and none passes 0 on a sample.
+// every kernel. Parameter changes take 128 samples, as in the other tests, and none crosses 0
+// exactly on a sample.
 Score turned_score(const Program& program) {
   Score score = support::score_of(
       program, {.frames = 12000, .reach = 0.02, .lowest_hz = 2.0, .highest_hz = 40.0});

@@ -167,8 +167,8 @@ std::string of(const char* text, char letter) {
   return out;
 }
 
-// Returns the largest relative error of the balance after the forces of the first samples. The
-// link's K is scaled to the softest element it holds, which is about 1.
+// Returns the largest relative error of the balance after the first samples. The link's K is scaled
+// to the softest element that it connects, which is about 1.
 double off_books(const std::string& text, int frames = 6000) {
   Books books(text);
   double off = 0.0;
@@ -241,7 +241,7 @@ TEST_CASE("links between masses, places and waveguides balance the energy", "[hy
         for (const double k : {0.01, 0.1, 1.0, 10.0, 100.0, 1000.0}) {
           const bool has_plain = law == "spring" || law == "quadratic" || law == "cubic";
           if (has_plain && !has_waveguide) {
-            continue;  // Its springs use the published scheme and are limited.
+            continue;  // Its springs use the published scheme and have a stability limit.
           }
           const std::string between = of(a.place, 'a') + " " + of(b.place, 'b');
           const std::string link =
@@ -272,8 +272,8 @@ TEST_CASE("links between masses, places and waveguides balance the energy", "[hy
 }
 
 TEST_CASE("a released string keeps its energy after a pluck, bow or contact", "[hybrids]") {
-  // Position inputs that sweep past, that pull and then outrun all friction, and that push and
-  // leave: their position in sample n. Nothing else removes energy for ten seconds.
+  // Position inputs that sweep past, that pull until all friction slips, and that push and leave;
+  // the value is their position in sample n. For ten seconds nothing else removes energy.
   static constexpr int let_go = 22050;
   constexpr int second = 44100;
   struct Hand {
@@ -470,7 +470,8 @@ TEST_CASE("any links among few places balance the energy", "[hybrids]") {
   }
 }
 
-// Beyond the limit most grow; links on the heaviest waves may last a little longer.
+// Beyond the limit most networks grow. Links on the heaviest waves may stay bounded a little
+// longer.
 TEST_CASE("random hybrids are stable below the limit of their masses", "[hybrids]") {
   Random random(1401);
   int grown = 0;

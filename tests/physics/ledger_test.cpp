@@ -106,8 +106,8 @@ class Ledger {
     for (std::size_t i = 0; i < inputs.size(); ++i) {
       const InputSlot& input = program.inputs[i];
       const double way = .5 * (body_.v[input.node] + v_[input.node]);
-      // The reaction force on a position input includes passive links of this sample and plain
-      // links of the next.
+      // The reaction force on a position input includes the passive links of this sample and the
+      // plain links of the next sample.
       const double force =
           input.is_force ? inputs[i] : -(before[input.node] + heard[i] - force_[input.node]);
       work += force * way;

@@ -101,8 +101,8 @@ Preset preset_of(const Network& network, bool bare, int voices) {
   return preset;
 }
 
-// A second of everything at once: more notes than voices, continuous bends, parameters that change
-// before their ramps end, jumping position inputs, long pushes.
+// A second with all kinds of events at once: more notes than voices, continuous bends, parameters
+// that change before their ramps end, jumping position inputs, long pushes.
 std::vector<Event> gestures(const Network& network, std::uint64_t seed) {
   Random random(seed);
   std::vector<Event> events;
@@ -269,7 +269,7 @@ TEST_CASE("models with different kernels are swapped", "[methods]") {
   const std::vector<Subject> all = subjects();
   Show plain;
   Show mixed;
-  // Some models follow before the previous one has faded.
+  // Some models start before the previous one has faded.
   for (std::size_t i = 0; const Turn& turn : turns_of(all)) {
     const std::size_t frames = i++ % 3 == 0 ? 1000 : 6000;
     plain.perform(turn, true, frames);

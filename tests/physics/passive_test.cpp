@@ -287,7 +287,8 @@ TEST_CASE("S07, T13: a Duffing oscillator has its linear period at small amplitu
     drift = std::max(drift, std::fabs(energy() / start - 1.0));
   }
   CAPTURE(show(drift));
-  // 2.75e-11, from x += v where v is much larger; a two-position form keeps 4e-13.
+  // The error 2.75e-11 comes from x += v with a much larger v; a scheme that stores two positions
+  // has 4e-13.
   CHECK(drift < 3e-11);
   Stepper<double> published = sprung("nlSpring3", "0.01 1. 0.", 20.0, 0.0, Passivity::never);
   for (int n = 0; n < 20; ++n) {
@@ -297,7 +298,8 @@ TEST_CASE("S07, T13: a Duffing oscillator has its linear period at small amplitu
 }
 
 TEST_CASE("S20: a clipped spring is continuous and gains no energy", "[passive]") {
-  // s = .01, c = 10, k = .5 without damping, from .2, below b = sqrt((k - s)/c) = .2214.
+  // s = .01, c = 10, k = .5 without damping, started at .2, which is below b = sqrt((k - s)/c) =
+  // .2214.
   const double b = std::sqrt(.49 / 10.0);
   const laws::ClippedSpring<double> spring{.01, 10., .5, 0.};
   CHECK(spring.force(b * (1 - 1e-12), 0.) ==
@@ -317,7 +319,7 @@ TEST_CASE("S20: a clipped spring is continuous and gains no energy", "[passive]"
   }
   CAPTURE(show(drift), most);
   CHECK(drift < 1e-11);
-  CHECK(most < .2 * 1.06);  // At rest between two samples: slightly above both.
+  CHECK(most < .2 * 1.06);  // The turning point lies between two samples, slightly above both.
   // Beyond b it is damped, so it can only lose energy.
   Stepper<double> far = sprung("nlSpringDamper", "0.01 10. 0.5 0.", 5.0, 0.0, Passivity::always);
   for (int n = 0; n < 1000; ++n) {
@@ -427,7 +429,7 @@ TEST_CASE("links without a stability proof are made passive, with a note", "[pas
         "played as published: 1 spring that bends, 1 bow, 2 contacts may gain energy. Use "
         "--budget passive=auto to prevent it");
   CHECK(!usual.hazard);
-  // Bows of two profiles, and springs of two laws, share one note.
+  // Two bows of different profiles, and springs of two laws, share one note.
   const std::vector<std::string> notes =
       choose_schemes(
           network_of(text + "@b2 nlBow @in1 @m 0.2 0.01 1\n@q2 nlSpring2 @g @n 0. 3. 0.\n"), {})
@@ -437,7 +439,7 @@ TEST_CASE("links without a stability proof are made passive, with a note", "[pas
   CHECK(notes[1].starts_with("2 bows made passive"));
   // Passive links need no proof, except for a spring's slope at rest.
   CHECK(without_passive(network, usual.links).links.size() == 3);
-  // The kernel's runs never mix them.
+  // The kernel never mixes them in one run.
   const Program program = make_program(network, 44100.0, true, usual.links);
   std::size_t count = 0;
   for (const LinkRun& run : program.link_runs) {
@@ -508,8 +510,8 @@ TEST_CASE("a bow's profile parameter reproduces both profiles bit for bit", "[pa
   }
 }
 
-// A finger at rest on a string at rest is at the top of the potential hill, however steep: nothing
-// moves by itself. The smallest push makes it slide down.
+// A finger at rest on a string at rest is at the top of a potential hill. However steep the hill
+// is, nothing moves by itself, and the smallest push makes it slide down.
 TEST_CASE("a mass at rest on the top of a pluck stays there", "[passive]") {
   const std::string mass = "@g ground 0.\n@b mass 1. 0. 0.\n";
   for (const double k : {0.1, 1.0, 3.0, 1000.0}) {

@@ -57,7 +57,8 @@ Impact fly(double v, double k, double p, double z, Passivity passive = Passivity
 struct Quadratised {
   double k = 0.0;
   double p = 1.0;
-  bool is_wall = false;  // Acts only for x > 0; a rest of psi outside is given back.
+  // Acts only for x > 0; a remainder of psi outside is returned to the motion.
+  bool is_wall = false;
   double x = 0.0;
   double v = 0.0;
   double psi = 0.0;
@@ -149,9 +150,9 @@ TEST_CASE("a damped contact restores the energy of Hunt and Crossley's model", "
 }
 
 TEST_CASE("a string against a midpoint stop sounds a fourth higher", "[published]") {
-  // For half of its period the string swings as a whole, which takes T/2; then as two halves for
-  // one period of their own, T/4: 3/4 T in all (Cabannes 1984; Issanchou et al. 2017). With equal
-  // masses and K = M waves have no dispersion: T = 2 (N + 1) samples.
+  // For half of its period the string swings as a whole, which takes T/2; then it swings as two
+  // halves for one of their own periods, T/4. The total is 3/4 T (Cabannes 1984; Issanchou et al.
+  // 2017). With equal masses and K = M waves have no dispersion: T = 2 (N + 1) samples.
   constexpr int masses = 199;
   constexpr int period = 2 * (masses + 1);
   std::string text = "@g ground 0.\n@w ground 0.\n";
@@ -170,7 +171,7 @@ TEST_CASE("a string against a midpoint stop sounds a fourth higher", "[published
     string.go();
     heard.push_back(string.x[49]);
   }
-  // Returns the lag of the largest autocorrelation.
+  // Returns the autocorrelation at a lag.
   const auto likeness = [&](int lag) {
     double sum = 0.0;
     for (int n = 0; n < 6 * period; ++n) {
@@ -186,9 +187,9 @@ TEST_CASE("a string against a midpoint stop sounds a fourth higher", "[published
 }
 
 TEST_CASE("a bowed string shows Helmholtz motion", "[published]") {
-  // At a share b of its length the string moves with the bow for 1 - b of the period and against it
-  // for b, with a period of 2 (N + 1) sqrt(M/K) samples (Helmholtz 1863; Desvages and Bilbao 2016).
-  // Rounded corners and creep during sticking reduce this a little.
+  // Helmholtz motion (Helmholtz 1863; Desvages and Bilbao 2016): at a fraction b of its length the
+  // string moves with the bow for 1 - b of the period and against it for b. The period is 2 (N + 1)
+  // sqrt(M/K) samples. Rounded corners and creep during sticking reduce this share a little.
   constexpr int masses = 119;
   const double period = 2.0 * (masses + 1) / std::sqrt(.8);
   for (const int place : {20, 24, 30}) {
@@ -233,7 +234,7 @@ TEST_CASE("the auxiliary-variable and discrete-gradient schemes agree for a ball
   // error and restores the speed.
   const double v = 1e-3;
   for (const double p : {1.3, 1.5, 2.3}) {
-    const double k = .5 * v * v * (p + 1.0) / std::pow(.05, p + 1.0);  // Depth 0.05.
+    const double k = .5 * v * v * (p + 1.0) / std::pow(.05, p + 1.0);  // k for a depth of 0.05
     const auto depth_of = [&](int times, bool is_quadratised) {
       const double scale = times;
       const double stiffness = k / (scale * scale);

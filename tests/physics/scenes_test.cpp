@@ -48,9 +48,9 @@ struct NonlinearScene {
   std::vector<double> grounds;
   std::vector<SceneLink> links;
   std::vector<Push> pushes;  // One input each.
-  bool has_hand = false;  // It has one link to the last mass, which otherwise has only linear ones.
+  bool has_hand = false;  // It has one link to the last mass, whose other links are all linear.
   double hand_speed = 0.0;  // Per sample.
-  double hand_turn = 1.0;   // Position where it turns back.
+  double hand_turn = 1.0;  // Position at which it turns back.
 
   std::size_t nodes() const { return masses.size() + grounds.size() + (has_hand ? 1 : 0); }
   double hand_at(std::size_t n) const {
@@ -141,7 +141,7 @@ SceneLink random_link(Random& random, Kind kind, std::size_t a, std::size_t b, d
   SceneLink link{.kind = kind, .a = a, .b = b};
   const auto any = [&](double least, double most) { return m * of_any_size(random, least, most); };
   const double z = random.below(2) == 0 ? 0.0 : any(1e-4, 2.0);
-  // Every third link starts exactly at its edge.
+  // Every third link starts exactly at the edge of its force.
   const double reach = random.below(3) == 0 ? -e : random.uniform(-.1, .1);
   const double k = any(1e-3, 1e6);
   switch (kind) {
@@ -349,7 +349,8 @@ class EnergyJudge {
       const double change = half_way(link.a) - half_way(link.b);
       const auto [k, z] = linear_of(link);
       work -= z * change * change;
-      // In the published scheme linear links exert no force in the first sample, as if held.
+      // Linear links exert no force in the first sample of the published scheme, as if the masses
+      // were held.
       work +=
           n > 0 ? 0.0 : (k * stretch(1, link) + z * (stretch(1, link) - stretch(0, link))) * change;
     }
@@ -422,8 +423,8 @@ class EnergyJudge {
     }
   }
 
-  // Force of the driven input's link on the last mass: the part of its acceleration that nothing
-  // else explains.
+  // Force of the driven input's link on the last mass: the part of its acceleration that no other
+  // force explains.
   double felt(std::size_t n) const {
     const std::size_t mass = scene_.masses.size() - 1;
     const SceneMass& body = scene_.masses[mass];
@@ -445,10 +446,10 @@ class EnergyJudge {
   }
 
   const NonlinearScene& scene_;
-  std::array<std::vector<double>, 3> x_;  // The last sample but one, the last, the next.
+  std::array<std::vector<double>, 3> x_;  // The previous, the current and the next sample.
   double energy_ = 0.0;
   double start_ = 0.0;
-  double balance_ = 0.0;  // Work put in, minus the dissipation of linear dampers.
+  double balance_ = 0.0;  // Work done, minus the dissipation of linear dampers.
   double passed_ = 0.0;
   double worked_noise_ = 0.0;
 };
@@ -456,17 +457,17 @@ class EnergyJudge {
 struct Outcome {
   double excess = 0.0;
   bool is_finite = true;
-  bool is_lost = false;  // The voice fell silent without having been thrown out of range.
+  bool is_lost = false;  // The voice was muted although it stayed within range.
 };
 
-constexpr double far_away = 1e8;  // Voices are not followed beyond ten times this.
+constexpr double far_away = 1e8;  // Voices are followed up to ten times this distance.
 
 Outcome play(const NonlinearScene& scene, Passivity passive, std::size_t frames) {
   const std::string text = text_of(scene);
   Player player(text, default_preset(network_of(text), true),
                 {.bare = true, .budget = Budget{.passive = passive}});
   EnergyJudge judge(scene);
-  const DenormalsFlushed flushed;  // As during playing.
+  const DenormalsFlushed flushed;  // Denormals are flushed, as during playing.
   constexpr std::size_t block = 256;
   const std::size_t inputs = scene.pushes.size() + 1;
   std::vector<std::vector<double>> in(inputs, std::vector<double>(block));
@@ -534,8 +535,8 @@ TEST_CASE("no scene gains energy as played", "[scenes]") {
 }
 
 TEST_CASE("scenes that once gained energy or fell silent stay fixed", "[scenes]") {
-  // Seeds out of 40,000: a force of 1e5 on a cubic spring of K/M = 1e6; a pluck of 1e6 at whose
-  // edge a mass comes to rest; 181 bows on one mass.
+  // Seeds below 40,000 that once failed: a force of 1e5 on a cubic spring of K/M = 1e6; a pluck of
+  // 1e6 with a mass that comes to rest at its edge; 181 bows on one mass.
   for (const std::uint64_t seed :
        {269, 14880, 17910, 21096, 24147, 28608, 40866, 41933, 45108, 56846, 58139}) {
     CAPTURE(seed);

@@ -24,7 +24,8 @@ std::string network(std::uint64_t seed) {
   const bool is_mesh = random.below(2) == 0;
   const auto rows = 5 + random.below(6);
   const auto columns = is_mesh ? 5 + random.below(6) : 20 + random.below(60);
-  const bool is_written = seed % 2 == 1;  // Written mass by mass, else as a macro held at places.
+  // Written mass by mass, otherwise as a macro connected at places.
+  const bool is_written = seed % 2 == 1;
   if (is_written) {
     text += is_mesh ? scenes::square_mesh("s", static_cast<int>(rows), static_cast<int>(columns),
                                           show(k), show(z))

@@ -45,7 +45,7 @@ bool has_passed(double d, bool& has_touched) {
   return has_touched && d > 1.5 * pluck_scale;
 }
 
-// The oscillator's amplitude, in scales, after the finger has passed or reached its end.
+// Returns the oscillator's amplitude, in scales, after the finger has passed or reached its end.
 double plucked_finely(double k, double speed) {
   const int fineness = k > 5.0 ? 1000 : 200;
   double amplitude = 0.0;
@@ -137,7 +137,7 @@ Sound bowed_finely(double z, double shape = 0.) {
   return listen(fineness, [&] { return states[i++]; });
 }
 
-// With this many steps per sample.
+// `steps` is the number of steps per sample.
 Sound bowed(double z, Passivity passive, int steps = 1, double shape = 0.) {
   const Network network =
       network_of("@in1 posInput 0.\n@o osc 1. 0.01 0.0005 0. 0.\n@b nlBow @in1 @o " + show(z) +
@@ -155,8 +155,9 @@ Sound bowed(double z, Passivity passive, int steps = 1, double shape = 0.) {
 
 // --- S16 -----------------------------------------------------------------------------------------
 
-// The bowed string of the reference: 150 masses, K = .1, Z = .001, bowed at 133 with .08 and 5e-5
-// at 2e-5 per sample; heard at 10, from the second second on for two, at `times` the rate.
+// Renders the bowed string of the reference: 150 masses, K = .1, Z = .001, bowed at mass 133 with
+// .08 and 5e-5 at 2e-5 per sample. Returns the output at mass 10 for two seconds, beginning after
+// the first second, at `times` the rate.
 std::vector<double> bowed_string(int times, Passivity passive) {
   const Network network = network_of(scenes::string("low", 150, "0.1", "0.001") +
                                      "@in1 posInput 0.\n@bow nlBow @in1 @low_m133 0.08 0.00005\n" +
@@ -271,9 +272,9 @@ TEST_CASE("S14, T14: a pluck releases at the correct point, to one step", "[stre
       const double reference = plucked_finely(k, speed);
       const double found = plucked(k, speed, Passivity::always);
       CAPTURE(k, speed, reference, found);
-      // One step per sample, of second order: a finger that takes 20 samples or more across the
-      // hill is accurate to a few per cent, one that takes two samples to a third. It never gains
-      // energy.
+      // One step per sample is of second order: a finger that crosses the hill in 20 samples or
+      // more is accurate to a few per cent, and a finger that crosses it in two samples to a third.
+      // Energy never grows.
       CHECK(found == Approx(reference).epsilon(speed > 5e-3 ? .37 : .08));
     }
   }
@@ -285,7 +286,8 @@ TEST_CASE("S14, T14: a pluck releases at the correct point, to one step", "[stre
     CAPTURE(k, reference, found);
     CHECK(found == Approx(reference).epsilon(k > 40.0 ? .055 : k > 5.0 ? .015 : .01));
   }
-  // The published scheme is accurate while soft and slow, then tunnels, then diverges.
+  // The published scheme is accurate while the finger is soft and slow. Harder fingers tunnel, then
+  // diverge.
   CHECK(plucked(.5, 1e-3, Passivity::never) == Approx(plucked_finely(.5, 1e-3)).epsilon(.005));
   CHECK(plucked(.5, 1e-2, Passivity::never) < 1e-9);
   CHECK(plucked(40., 1e-4, Passivity::never) > 2.0 * plucked_finely(40., 1e-4));
@@ -294,8 +296,8 @@ TEST_CASE("S14, T14: a pluck releases at the correct point, to one step", "[stre
 
 TEST_CASE("S15, T15: a strong bow sticks as it should", "[stress_contacts]") {
   // Reference: Runge-Kutta with 50 steps per sample, tabulated. Above Z = 3 M friction and inertia
-  // agree at several speeds. One sample cannot decide when such a bow slips, and it slips too
-  // early, without gaining energy: such bows need a higher rate.
+  // balance at several speeds. One step per sample cannot resolve when such a bow slips: it slips
+  // too early, without gaining energy. Such bows need a higher rate.
   struct Row {
     double z;
     double rms;
@@ -340,7 +342,7 @@ TEST_CASE("S15: a bow of any strength sticks with steps of Z below 3 M", "[stres
       CAPTURE(shape, z, steps, reference.rms, reference.period, found.rms, found.period);
       CHECK(found.rms == Approx(reference.rms).epsilon(.003));
       CHECK(found.period == Approx(reference.period).epsilon(.003));
-      // With half the steps it slips too early.
+      // Half the steps make it slip too early.
       if (steps > 1) {
         const Sound early = bowed(z, Passivity::always, steps / 2, shape);
         CHECK(early.period < .9 * reference.period);
@@ -409,7 +411,7 @@ TEST_CASE("chains and grids step passive links as the direct kernel does", "[str
   const auto play = [](Program program, Isa isa, auto number) {
     Bare<decltype(number)> bare(std::move(program), 1, isa);
     std::vector<double> heard;
-    for (int n = 0; n < 800; ++n) {  // Before it becomes chaotic.
+    for (int n = 0; n < 800; ++n) {  // Ends before the motion becomes chaotic.
       const std::vector<double> out = bare.step({.05 * std::sin(.01 * n)});
       heard.insert(heard.end(), out.begin(), out.end());
     }

@@ -1,5 +1,5 @@
 // Quantifies where the published scheme fails, as a baseline for the corrected schemes. Also lists
-// effects that are physical and must stay.
+// effects that are physical and must be kept.
 #include <functional>
 #include <numbers>
 
@@ -97,7 +97,8 @@ TEST_CASE("S01: an oscillator at the edge of stability", "[stress_energy]") {
       const double root = z == 0.0 ? 1.000500125e-3 : 9.90292e-5;  // |z| - 1
       CHECK(growth == Approx(std::log1p(root)).epsilon(z == 0.0 ? 1e-6 : 3e-2));
     }
-    // The energy meter shows it: where the energy can be negative, the amplitude is unbounded.
+    // The energy meter shows the limit: where the energy can be negative, the amplitude is
+    // unbounded.
     lab.set_state({-1.0}, {-2.0});
     CHECK((lab.energy() < 0.0) == (beyond > 0.0));
   }

@@ -1,5 +1,5 @@
-// Linear cases at the limits of stability, each beside the plain scheme, which diverges: a
-// shrinking mass, unequal masses, and invalid input of all kinds. stability_test has T1 and most
+// Linear cases at the limits of stability, each compared with the plain scheme, which diverges: a
+// shrinking mass, unequal masses, and invalid input of all kinds. stability_test covers T1 and most
 // limits.
 #include "app/realtime/process.h"
 #include "core/analysis/stability.h"
@@ -13,7 +13,8 @@ using namespace support;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// Growth of a network after an impulse, with one parameter at a value, in the plain scheme.
+// Returns the growth of a network after an impulse, with one parameter at a value, in the plain
+// scheme.
 double growth(const std::string& text, const std::string& name, double value, int steps) {
   const Network network = network_of(text);
   Program program = make_program(network, 44100.0, true);
@@ -56,7 +57,7 @@ std::string with_masses(std::string text) {
   return "@m_M param 1.\n" + text;
 }
 
-// The network stays bounded up to the limit, and diverges 1e-4 beyond it.
+// Checks that the network stays bounded up to the limit and diverges 1e-4 beyond it.
 void check_around(const std::string& text, const std::string& name, double limit, bool is_upper,
                   int steps) {
   const SafeRange range = range_of(text, name);
@@ -124,7 +125,7 @@ TEST_CASE("S22: a light mass on a heavy one is stable up to its limit", "[stress
   CHECK(range_of(text, "k").highest == Approx(limit).epsilon(1e-9));
   CHECK(growth(text, "k", 0.00399, 100000) < 1e4);
   CHECK(growth(text, "k", 0.004, 100000) > 1e10);
-  // A row-wise bound would be half as large: k (1/.001 + 1/.001) < 4.
+  // A bound by rows would be half as large: k (1/.001 + 1/.001) < 4.
   const auto verdict = [&](double k) {
     const Network network = network_of(text);
     const auto compiled = compile_network(network, default_preset(network, true),
@@ -193,7 +194,7 @@ TEST_CASE("S25: invalid models give an error or silence, never NaN", "[stress_li
 }
 
 TEST_CASE("S25: a parameter is kept from values that make an argument NaN", "[stress_linear]") {
-  // 1/p, and a mass that may vanish: the ranges end before that.
+  // 1/p, and a mass that may vanish: the ranges end before these values.
   for (const std::string& text :
        {"@p param 0.5\n@o osc 1. 0.1/p 0. 0. 0.\n@in1 frcInput @o\n" + scenes::output(1, "o"),
         "@p param 0.5\n@o osc p 0.1 0. 0. 0.\n@in1 frcInput @o\n" + scenes::output(1, "o")}) {
@@ -297,7 +298,8 @@ TEST_CASE("S25: a force input accepts any level, and its sound decays", "[stress
       player.run(force.size(), {}, {256}, std::span(&input, 1));
       const std::span<const double> y = player.y();
       REQUIRE(std::ranges::all_of(y, [](double sample) { return std::isfinite(sample); }));
-      // Measured by speed, because contacts displace it; a tenth allows for periods of few samples.
+      // Measured by speed, because contacts displace the mean position; the tolerance of a tenth
+      // allows for periods of few samples.
       const double soon = support::largest_step(y.subspan(second, second / 2));
       CHECK(support::largest_step(y.subspan(5 * second / 2)) <= 1.1 * soon);
       if (loudness <= 1e6) {

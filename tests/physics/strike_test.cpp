@@ -79,8 +79,8 @@ struct StruckTwice {
   Event blow_with_input;
 };
 
-// With every published kernel, a strike equals the input's effect in the direct kernel, with or
-// without such an input.
+// Checks that with every published kernel a strike has the effect of the input in the direct
+// kernel, whether or not the model has such an input.
 void check_strike(const StruckTwice& struck, std::set<Method>& seen) {
   CompileOptions options{.rate_hz = 48000.0, .bare = true, .method = Method::direct};
   const Sound by_input = play(struck.with_input, options, pushed());
@@ -97,7 +97,7 @@ void check_strike(const StruckTwice& struck, std::set<Method>& seen) {
   }
 }
 
-// Without damping, a strike between two samples equals a force in the second of them to rounding,
+// Without damping, a strike between two samples equals a force in the second sample to rounding,
 // because links act by earlier positions.
 TEST_CASE("A struck mass moves as a force input would move it", "[strike]") {
   const std::vector<std::string> texts = {
@@ -123,14 +123,14 @@ TEST_CASE("A struck mass moves as a force input would move it", "[strike]") {
   CHECK(seen.size() == methods_for(KernelRow::Use::published).size());
 }
 
-// With damping, kernels that compute forces within the sample damp the strike at once: a share of
-// Z/M, at most 0.02 here.
+// Kernels that compute forces within the sample damp the strike at once when there is damping, by a
+// share of Z/M, at most 0.02 here.
 TEST_CASE("A struck mass of any network moves nearly like one with a force input", "[strike]") {
   std::size_t compared = 0;
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
     const RandomNetwork random = random_network(seed);
     const auto masses = named_masses(random.text);
-    // A force output includes an input's force, but no strike.
+    // A force output includes the force of an input but not that of a strike.
     if (masses.empty() || !random.is_linear || random.text.find("frcOutput") != std::string::npos) {
       continue;
     }
@@ -158,8 +158,8 @@ TEST_CASE("A struck mass of any network moves nearly like one with a force input
   CHECK(compared > 100);
 }
 
-// A kernel inside another one is uninitialised before its first step. With several steps per sample
-// the strike acts for part of a sample, which changes the fastest mode by a hundredth.
+// A kernel inside another kernel is uninitialised before its first step. With several steps per
+// sample the strike acts for part of a sample, which changes the fastest mode by a hundredth.
 TEST_CASE("A voice is struck in its first sample", "[strike]") {
   const std::string text = scenes::string("s", 5, "0.000001", "0.") + scenes::output(1, "s_m3");
   Event blow = struck_at(named_masses(text)[1].second);
@@ -190,12 +190,12 @@ std::uint32_t mass_called(const std::string& text, const std::string& name) {
 
 struct StruckPlace {
   std::string text;
-  std::string place;  // As written in the model.
+  std::string place;  // Place as written in the model.
   std::string name;   // Name used for the strike.
 };
 
-// With dampers a strike equals a force input in kernels that store the forces of the next sample or
-// know the loss of a mode: in the direct form and by modes.
+// A strike with dampers equals a force input in kernels that store the forces of the next sample or
+// know the loss of a mode: the direct and the modal kernel.
 TEST_CASE("A struck place moves as a force input there would move it", "[strike]") {
   const std::string strings =
       "@p param 0.6\n@s waveguide 1. 220. 3. 0.4 0.\n@t openWaveguide 0.5 110. 3. 0.6 0.\n"
@@ -234,7 +234,7 @@ TEST_CASE("A struck place moves as a force input there would move it", "[strike]
   CHECK(seen.size() >= 4);
 }
 
-// In a voice as notes play it, in single precision, too, at another pitch.
+// The same in a voice that notes play, also in single precision and at another pitch.
 TEST_CASE("A struck place sounds at the pitch of the last key", "[strike]") {
   const std::string text =
       "@s waveguide 1. 220. 3. 0.4 0.\n@in1 frcInput [@s 0.2]\n@out1 posOutput [@s 0.3]\n";
@@ -274,7 +274,7 @@ TEST_CASE("A model without any input is struck, and costs nothing until then", "
   player.run(4410, {struck_at(mass)});
   CHECK(player.compiled.engine->meters().stepped == 1);
   CHECK(peak(player.y()) > 0.0);
-  // Inaudible parts are culled as before.
+  // Inaudible parts are removed, with or without strikes.
   const auto deaf =
       compile_network(network_of(scenes::string("s", 20, "0.1", "0.001")), preset, options);
   REQUIRE(deaf);

@@ -29,8 +29,9 @@ struct Partial {
   double t60_s = 0.0;
 };
 
-// The partial near a guess: two windows at different times give its frequency from the phase
-// advance and its decay from the level; a Blackman-Harris window keeps other partials 92 dB away.
+// Measures the partial near a guess: two windows at different times give its frequency from the
+// phase advance and its decay from the level; a Blackman-Harris window suppresses other partials by
+// 92 dB.
 Partial partial_of(std::span<const double> y, double rate_hz, double guess_hz, std::size_t window,
                    std::size_t later) {
   const auto seen = [&](std::size_t from) {
@@ -97,7 +98,7 @@ TEST_CASE("88 keys of waveguides have the requested pitch and decay", "[waveguid
       const auto y = rendered((is_open ? "openWaveguide 1.3 " : "waveguide 1.3 ") + number(hz) +
                                   " " + number(t60) + " " + number(brightness) + " 0.",
                               rate, window + later);
-      // An open waveguide drifts by a step, which a difference removes.
+      // An open waveguide drifts by a step, which the difference removes.
       std::vector<double> speed(y.size());
       std::adjacent_difference(y.begin(), y.end(), speed.begin());
       const Partial found = partial_of(speed, rate, hz, window, later);
@@ -131,7 +132,7 @@ TEST_CASE("a waveguide's loop never gains energy and stays within its memory", "
       most = std::max(most, std::abs(found.gain * (1.0 - found.pole) / (1.0 - found.pole * back)));
     }
     REQUIRE(most <= 1.0 + 1e-15);
-    // The loop's own pole, if the requested values are reachable.
+    // Checks the loop's own pole, if the requested values are reachable.
     if (numbers.frequency_hz < 20.0 || numbers.frequency_hz > highest_waveguide_hz(least, rate) ||
         numbers.t60_s * numbers.frequency_hz < least_t60_periods) {
       continue;
@@ -195,7 +196,7 @@ TEST_CASE("a mass on a spring reflects waves as its impedance says", "[waveguide
     v.push_back(0.5 * (now + before));
     before = now;
   }
-  // The pulse passes 600 samples after it was made, and returns 1800 samples later.
+  // The pulse passes 600 samples after it was made and returns 1800 samples later.
   const auto spectrum = [&](int first, int last, double theta) {
     Complex sum = 0.0;
     for (int n = first; n < last; ++n) {
@@ -268,7 +269,7 @@ TEST_CASE("a glide reaches its pitch without noise", "[waveguides]") {
   double most = 0.0;
   double before = 0.0;
   for (int n = 0; n < 72000; ++n) {
-    if (n >= 4000 && n < 30000 && n % 64 == 0) {  // A fifth in half a second.
+    if (n >= 4000 && n < 30000 && n % 64 == 0) {  // Sweeps by a fifth in half a second.
       const double way = static_cast<double>(n - 4000) / 26000.0;
       guide.set_coefficients(0, {220.0 * std::pow(1.5, way)}, 1.0, false);
     }
@@ -340,8 +341,8 @@ TEST_CASE("twenty places on a short waveguide occupy distinct samples", "[wavegu
   CHECK(late > 0.3 * early);
 }
 
-// A loop of N samples has N(N-1)/2 pairs of places, with different shortest paths between samples
-// that must not be read together; random pitches, places and lanes.
+// A loop of N samples has N(N-1)/2 pairs of places, with different shortest paths, across which
+// samples must not be read as one block. Pitches, places and lanes are random.
 TEMPLATE_TEST_CASE("block-wise processing of waves has the bits of sample-wise processing",
                    "[waveguides]", float, double) {
   const std::string text =

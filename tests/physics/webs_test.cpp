@@ -147,8 +147,8 @@ TEST_CASE("a web gains no energy at any strike", "[webs]") {
 }
 
 TEST_CASE("a web keeps the energy of its springs", "[webs]") {
-  // The variable follows the springs' potential less accurately when motion is near half the rate,
-  // which a contact of K = M excites. No work is lost.
+  // The auxiliary variable follows the springs' potential less accurately when the motion is near
+  // half the rate, which a contact with K = M excites. No work is lost.
   const std::string springs = "nlSpring3 .1 .01 0.";
   const std::string contact = "@c contact @w @m6_6 1. 0.\n";
   CHECK(judge(mesh(springs), .1, 20'000, 0.0, cubic).drift < 1e-4);
@@ -159,7 +159,8 @@ TEST_CASE("a web keeps the energy of its springs", "[webs]") {
 
 TEST_CASE("a web is as accurate as the published scheme, against eight times the rate", "[webs]") {
   // Signal-to-error ratio over 10 ms. Where springs reach seven times their stiffness at rest, the
-  // published scheme is a tenth worse; a little further it diverges, and the web continues.
+  // published scheme is a tenth worse; a little further it diverges, while the passive web stays
+  // stable.
   const auto heard = [](double blow, int times, Passivity passive) {
     const Network network = network_of(mesh("nlSpring3 .1 .01 0.0001"));
     Bare<double> bare(

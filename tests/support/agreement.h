@@ -14,10 +14,11 @@ inline double tolerance_of(Method method) {
   return method == Method::modal ? 1e-9 : 1e-12;
 }
 
-// The least agreement in float, unless the direct kernel itself has little more: errors of a force
-// output relative to positions, and of quiet outputs beside loud ones. A grid's border sums and a
-// matrix's rows contain absolute positions, so they lose precision for rigid motion. Nonlinear
-// links add rounding of their thresholds, and drifting networks are far from 0.
+// Returns the least agreement in float that is required, unless the direct kernel itself is little
+// better. Errors of a force output count relative to positions, and errors of quiet outputs
+// relative to loud ones. A grid's border sums and a matrix's rows contain absolute positions, so
+// they lose precision in rigid motion. Nonlinear links add the rounding of their thresholds, and
+// drifting networks are far from 0.
 inline double least_db(Method method, bool is_plain) {
   const bool is_of_links =
       method == Method::direct || method == Method::chains || method == Method::batch;
@@ -33,7 +34,7 @@ inline void check_double(Method method, const std::vector<Comparison>& outputs) 
   }
 }
 
-// `is_plain`: linear, and near 0.
+// `is_plain`: the network is linear and stays near 0.
 inline void check_float(Method method, const std::vector<Comparison>& outputs,
                         const std::vector<Comparison>& direct, bool is_plain) {
   for (std::size_t i = 0; i < outputs.size(); ++i) {

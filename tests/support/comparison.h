@@ -70,7 +70,7 @@ inline Score score_of(const Program& program, const ComparisonOptions& options) 
   return score;
 }
 
-// One kernel, driven block by block.
+// One kernel, played block by block.
 template <class T>
 class Fighter {
  public:
@@ -206,7 +206,8 @@ std::vector<Comparison> compare_kernels(const Program& formed, const ComparisonO
                  perform<T>(formed, score, options.isa));
 }
 
-// Checks every output on every instruction set: double within `relative`, float above `db`.
+// Checks every output on every instruction set: double to within `relative`, float to at least
+// `db`.
 inline void same_as_direct(const Program& program, ComparisonOptions options, double relative,
                            double db) {
   for (const Isa isa : isas()) {

@@ -8,9 +8,9 @@
 
 namespace ressort::support {
 
-// A partial's frequency and T60 between two windows of a second or less: from the phase advance
-// beyond a guess, and from the drop in level. A four-term Blackman-Harris window keeps others 92 dB
-// away.
+// A partial's frequency and T60, measured between two windows of a second or less: the frequency
+// from the phase advance beyond a guess, the decay from the drop in level. A four-term
+// Blackman-Harris window suppresses other partials by 92 dB.
 struct HeardPartial {
   double hz = 0.0;
   double t60_s = 0.0;

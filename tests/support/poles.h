@@ -12,8 +12,8 @@
 
 namespace ressort::support {
 
-// The map of (x, v) of the moving nodes over one sample, found by stepping the kernel from each
-// unit vector; links act from the second sample on.
+// Returns the map of (x, v) of the moving nodes over one sample, found by stepping the kernel from
+// each unit vector. Links act from the second sample on.
 template <class T = double>
 Eigen::MatrixXd transition(const Program& program, Isa isa = best_isa()) {
   Bare<T> bare(program, 1, isa);
@@ -131,8 +131,8 @@ inline std::vector<Pole> continuous_poles(const Matrices& matrices) {
   return poles;
 }
 
-// The continuous network's motion in closed form, for proportional dampers and equal masses: each
-// mode passes through its value at the start and one sample later.
+// The continuous network's motion in closed form, for proportional dampers and equal masses. Each
+// mode has the given values at the start and one sample later.
 class Continuous {
  public:
   explicit Continuous(const Program& program) {

@@ -16,8 +16,8 @@
 
 namespace ressort::support {
 
-// An icosahedron subdivided `times` times and projected onto a sphere: 12, 42, 162, 642 points;
-// with the sphere's volume, or with its points on the sphere.
+// Returns an icosahedron subdivided `times` times and projected onto a sphere: 12, 42, 162, 642
+// points; either with the sphere's volume or with its points on the sphere.
 inline Surface icosphere(int times, double radius, bool has_true_volume) {
   const double t = std::numbers::phi;
   Surface surface;

@@ -1,4 +1,4 @@
-// tests: how much of the slow tests is run.
+// tests: how much of the slow tests runs.
 #pragma once
 
 #include <cstdlib>

@@ -1,6 +1,6 @@
-// The 88 keys of a waveguide at three rates, and beside it those of the Synthesis ToolKit's plucked
-// strings, each judged from what it renders by tests/support/partial.h. Built by
-// `cmake --build build --target ressort_stk` where libstk is there.
+// Compares the 88 keys of a waveguide at three rates with those of the Synthesis ToolKit's plucked
+// strings, both measured from their renders by tests/support/partial.h. Built by `cmake --build
+// build --target ressort_stk` if libstk is installed.
 #include <stk/Plucked.h>
 #include <stk/Stk.h>
 #include <stk/Twang.h>
@@ -22,7 +22,7 @@ namespace {
 using namespace ressort;
 using namespace ressort::support;
 
-constexpr double t60_s = 2.0;  // that a waveguide is asked for
+constexpr double t60_s = 2.0;  // decay time requested from the waveguide
 
 using Sound = std::vector<double>;
 
@@ -81,7 +81,7 @@ struct String {
   std::function<Sound(double hz, double rate_hz, std::size_t frames)> play;
 };
 
-// From near to far, so that no turn of the phase is missed.
+// Widens the distance between the windows step by step, so that no turn of the phase is missed.
 HeardPartial heard(const Sound& sound, double rate_hz, double hz, double window_s, double apart_s) {
   HeardPartial found{.hz = hz};
   for (double apart = 1.0 / hz; apart < apart_s; apart *= 2.0) {
@@ -95,7 +95,7 @@ void judge(const String& string, double rate_hz) {
   std::string t60;
   for (int key = 21; key <= 108; ++key) {
     const double hz = 440.0 * std::exp2((key - 69) / 12.0);
-    const double window_s = 28.0 / hz;  // short: the highest of STK's end soon
+    const double window_s = 28.0 / hz;  // short, because the highest notes of STK end soon
     const double apart_s = 16.0 / hz;
     const auto frames = static_cast<std::size_t>(rate_hz * (window_s + apart_s)) + 2;
     const HeardPartial found =

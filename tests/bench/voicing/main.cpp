@@ -1,11 +1,12 @@
-// What every preset sounds like, in numbers:
+// Measures the sound of presets:
 //
-//   ressort_voicing [--keys STEP] [PRESET...]               a row each, ! at what is out of bounds
-//   ressort_voicing --random N [--seed S] [PRESET...]       N random settings of all controls each
-//   ressort_voicing --bows N [PRESET...]                    bows: N speeds and N pressures, 24 keys
+//  ressort_voicing [--keys STEP] [PRESET...]           one row each, ! after values out of bounds
+//  ressort_voicing --random N [--seed S] [PRESET...]   N random settings of all controls for each
+//  ressort_voicing --bows N [PRESET...]                bows: N speeds and N pressures, 24 keys
 //
-// Without names all presets that there are. STEP is how many keys lie between two whose pitch is
-// measured, from 21 to 108 (12). The table is Markdown. Sound is measured before the limiter.
+// Without names, all presets are measured. STEP is the distance in semitones between the keys whose
+// pitch is measured, from 21 to 108 (default 12). The table is Markdown. The sound is measured
+// before the limiter.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -27,20 +28,20 @@
 namespace ressort::voicing {
 namespace {
 
-// What a player must find.
+// Bounds that every preset must keep.
 constexpr double forte_peak_db = -12.0;
 constexpr double forte_tolerance_db = 2.0;
 constexpr double least_dynamics_db = 20.0;
 constexpr double most_dynamics_db = 30.0;
 constexpr double keyboard_db = 6.0;
-constexpr double usual_lufs = -26.5;  // of the phrase: all presets are alike loud
+constexpr double usual_lufs = -26.5;  // loudness of the phrase, the same for all presets
 constexpr double loudness_tolerance_db = 1.5;
 constexpr double struck_attack_s = 0.020;
 constexpr double bowed_attack_s = 0.150;
 constexpr double most_release_s = 0.6;
 constexpr double most_offset_db = -60.0;
 constexpr double most_correlation = 0.9;
-constexpr double most_mono_loss_db = 3.1;  // two ears that have nothing in common lose 3.01
+constexpr double most_mono_loss_db = 3.1;  // two uncorrelated channels lose 3.01 dB
 constexpr double most_cents = 0.1;
 constexpr double silence_db = -60.0;
 constexpr double rates_hz[] = {44100.0, 48000.0, 96000.0};
@@ -63,7 +64,7 @@ double wanted_hz(const Player& player, int key) {
 
 struct Tuning {
   double worst_cents = 0.0;
-  int unheard = 0;  // keys whose loudest partial, or family of partials, is another
+  int unheard = 0;  // keys at which another partial, or family of partials, is the loudest
   int silent = 0;
 };
 
@@ -99,7 +100,7 @@ Stereo phrase(Player& player) {
   return player.play(events, 5.2);
 }
 
-// Any lever half up and fully up, with no key.
+// Returns the worst offset with any lever half up and fully up and no key pressed.
 double worst_offset(Player& player) {
   double worst = offset_of(player.play({{0.0, note_on(60, 127)}}, 2.0).part(1.0, 2.0));
   for (const ControlSetting& control : player.scene().preset.controls) {
@@ -113,7 +114,7 @@ double worst_offset(Player& player) {
   return worst;
 }
 
-// By how much the limiter turns a sound down where it does so the most.
+// Returns the limiter's largest gain reduction for a sound, in dB.
 double limiting_db(const Stereo& sound) {
   Limiter limiter(sound.rate_hz);
   Stereo limited = sound;
@@ -246,8 +247,8 @@ int print_table(const std::vector<std::string>& names, int step) {
   return failures;
 }
 
-// Whether a bow speaks wherever a hand may put it, from 65 Hz on: at its key's pitch, within its
-// time, and the louder the faster.
+// Tests that a bow speaks at all speeds and pressures, from 65 Hz upwards: at its key's pitch,
+// within its attack time, and louder at higher speed. Returns the number of failures.
 int bow(const std::string& name, int count) {
   Player player(name, 48000.0);
   if (!is_bowed(player.scene().preset)) {

@@ -133,7 +133,7 @@ double Player::real_time_share(double seconds) {
     for (int voice = 0; voice < compiled_.instrument.voices; ++voice) {
       chord.push_back({0.0, note_on(48 + 2 * (voice % 18), 100)});
     }
-    // The processor's own time: others may want it as well.
+    // CPU time, because other processes may use the processor as well.
     const std::clock_t start = std::clock();
     run(chord, seconds, nullptr);
     least = std::min(least, static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);

@@ -1,4 +1,4 @@
-// tests: a preset's engine as `render` makes it, without the limiter, played note by note.
+// tests: plays a preset's engine note by note, as `render` makes it but without the limiter.
 #pragma once
 
 #include <memory>
@@ -25,13 +25,15 @@ Event press(double amount);  // the whole channel
 
 class Player {
  public:
-  // Throws std::runtime_error with all that is wrong.
+  // Throws std::runtime_error with all errors.
   Player(const std::string& name, double rate_hz);
 
-  // From silence, parameters as the preset has them; events sorted by time. Nothing comes in.
+  // Plays from silence, with the parameters of the preset and without input signals. The events are
+  // sorted by time.
   Stereo play(const std::vector<TimedEvent>& events, double seconds);
-  Stereo go_on(double seconds);            // with what sounds
-  double real_time_share(double seconds);  // of a core, by all voices, one note each
+  Stereo go_on(double seconds);  // Continues with the voices that sound.
+  // Returns the share of one core that all voices with one note each take.
+  double real_time_share(double seconds);
 
   const Scene& scene() const { return scene_; }
   const Instrument& instrument() const { return compiled_.instrument; }

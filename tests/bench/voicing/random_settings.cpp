@@ -13,20 +13,21 @@
 namespace ressort::voicing {
 namespace {
 
-// In s: a key is down, a lever moves, the key goes up, then the pedals.
+// Times in s: the key goes down, a lever moves, the key goes up, then the pedals.
 constexpr double press_s = 0.2;
 constexpr double move_s = 0.5;
 constexpr double lift_s = 1.0;
-constexpr double long_lift_s = 2.2;  // of one note in eight, whose offset is heard while it is held
-constexpr double pedals_up_s = 0.2;  // later
+// for one note in eight, whose offset is measured while it is held
+constexpr double long_lift_s = 2.2;
+constexpr double pedals_up_s = 0.2;  // after the key
 constexpr double after_s = 2.0;
-constexpr double undamped_after_s = 16.0;  // of presets that are to ring out
+constexpr double undamped_after_s = 16.0;  // for presets without damper, which must ring out
 
 constexpr double loudest_db = 0.0;
 constexpr double softest_db = -40.0;
 constexpr double most_offset_db = -60.0;
-constexpr double most_step_db = -60.0;  // of the peak
-constexpr double silence_db = -60.0;    // of the peak
+constexpr double most_step_db = -60.0;  // relative to the peak
+constexpr double silence_db = -60.0;  // relative to the peak
 
 constexpr int sustain_pedal = 64;
 constexpr int sostenuto_pedal = 66;
@@ -41,7 +42,7 @@ struct Setting {
   bool is_long = false;
   double lifted_s = lift_s;
 
-  // As if the lever had stayed.
+  // Returns the events without the lever's motion.
   std::vector<TimedEvent> unmoved() const {
     std::vector<TimedEvent> others;
     std::copy_if(events.begin(), events.end(), std::back_inserter(others),
@@ -56,10 +57,10 @@ std::string number(double value, int digits) {
   return text;
 }
 
-// A lever of the preset's, which nobody but a person moves.
+// A control of the preset that only a player moves.
 struct Lever {
   std::string name;
-  Event event;  // but for its value
+  Event event;  // complete except for its value
 };
 
 std::vector<Lever> levers_of(const Preset& preset) {
@@ -95,7 +96,7 @@ Setting random_setting(std::vector<Lever> levers, support::Random& random) {
   };
   const auto moved = [&](const Lever& lever) {
     Event event = lever.event;
-    // Now and then at an end, where a lever mostly stands.
+    // Every eighth value is at an end of the range, where levers are most of the time.
     const std::uint32_t place = static_cast<std::uint32_t>(random.below(8));
     event.value = place == 0 ? 0.0 : place == 1 ? 1.0 : random.uniform(0.0, 1.0);
     return event;
@@ -148,15 +149,15 @@ double largest_bend(const Stereo& sound, double from_s, double to_s) {
   return most;
 }
 
-// How much the second difference at a turn stands out of what is around it.
+// Returns how far the second difference at the time of a move exceeds that of its neighbourhood.
 double step_at(const Stereo& sound, double time_s) {
   const double around = std::max(largest_bend(sound, time_s - 0.06, time_s - 0.001),
                                  largest_bend(sound, time_s + 0.006, time_s + 0.06));
   return std::max(0.0, largest_bend(sound, time_s - 0.001, time_s + 0.005) - around);
 }
 
-// The same of what the lever has changed, by a sound in which it stays: many partials beat, and
-// what stands out may be the model's own.
+// The same for the change that the lever causes, found with a sound in which the lever stays:
+// partials beat, so the model itself can cause such peaks.
 double step_at(const Stereo& sound, const Stereo& unmoved, double time_s) {
   Stereo change = sound;
   for (std::size_t c = 0; c < change.channels.size(); ++c) {
@@ -209,10 +210,10 @@ int play_random_settings(Player& player, const std::string& name, int count, std
       expect(offset_db(setting.lifted_s - 1.2) <= most_offset_db, "DC while held",
              offset_db(setting.lifted_s - 1.2));
     }
-    if (setting.has_move && !preset.noise) {  // which is nothing but steps
+    if (setting.has_move && !preset.noise) {  // noise consists of steps only
       double step_db = decibels(step_at(sound, move_s) / std::max(peak, 1e-9));
       if (step_db > most_step_db) {
-        // Twice, as strokes from two sides take turns.
+        // Played twice, because strokes from two sides alternate.
         player.play(setting.unmoved(), move_s + 0.1);
         const Stereo unmoved = player.play(setting.unmoved(), move_s + 0.1);
         step_db = decibels(step_at(sound.part(0.0, move_s + 0.1), unmoved, move_s) /
@@ -224,7 +225,7 @@ int play_random_settings(Player& player, const std::string& name, int count, std
       const double end_s = static_cast<double>(sound.size()) / sound.rate_hz;
       return decibels(peak_of(sound.part(end_s - 0.2, end_s)) / std::max(peak, 1e-9));
     };
-    // Who has no damper is to ring out by itself.
+    // A preset without damper must ring out by itself.
     for (double more_s = preset.damper_s > 0.0 ? 0.0 : undamped_after_s;
          left_db() > silence_db && more_s > 0.0; more_s -= 2.0) {
       sound = player.go_on(2.0);

@@ -1,4 +1,4 @@
-// tests: whether every position of every control of a preset is music.
+// tests: checks that every setting of a preset's controls makes a usable sound.
 #pragma once
 
 #include <cstdint>
@@ -8,9 +8,9 @@
 
 namespace ressort::voicing {
 
-// Plays a note at each of `count` random settings of all controls, bend and pedals, with a lever
-// that moves in the midst of it; prints what is wrong with which, the first of each kind, and a
-// line of figures. Returns how many settings fail in any way.
+// Plays a note at each of `count` random settings of all controls, pitch bend and pedals, and moves
+// one lever during the note. Prints the first fault of each kind and a line of figures. Returns the
+// number of settings with faults.
 int play_random_settings(Player& player, const std::string& name, int count, std::uint64_t seed);
 
 }  // namespace ressort::voicing

@@ -17,7 +17,7 @@ double energy_of(std::span<const double> y) {
   return std::inner_product(y.begin(), y.end(), y.begin(), 0.0);
 }
 
-// Of consecutive pieces of 5 ms, both channels together.
+// Returns the energy of consecutive pieces of 5 ms, both channels together.
 std::vector<double> envelope_of(const Stereo& sound) {
   const auto step = static_cast<std::size_t>(0.005 * sound.rate_hz);
   std::vector<double> envelope;
@@ -31,7 +31,7 @@ std::vector<double> envelope_of(const Stereo& sound) {
   return envelope;
 }
 
-// In place; the length is a power of two.
+// Fast Fourier transform in place; the length is a power of two.
 void transform(std::vector<std::complex<double>>& x) {
   const std::size_t n = x.size();
   for (std::size_t i = 1, j = 0; i < n; ++i) {
@@ -74,7 +74,7 @@ struct Spectrum {
   double bin_hz = 1.0;
 };
 
-// `zeros`: how many times longer it is made, at least.
+// `zeros`: smallest factor by which zero padding lengthens the signal.
 Spectrum spectrum_of(std::span<const double> y, double rate_hz, std::size_t zeros) {
   std::size_t length = 1;
   while (length < y.size() * zeros) {
@@ -91,7 +91,7 @@ Spectrum spectrum_of(std::span<const double> y, double rate_hz, std::size_t zero
   return spectrum;
 }
 
-// The magnitudes of both channels, each by itself, so that nothing cancels.
+// Returns the magnitudes of both channels, computed separately so that nothing cancels.
 Spectrum spectrum_of(const Stereo& sound, std::size_t zeros) {
   Spectrum both = spectrum_of(sound.channels[0], sound.rate_hz, zeros);
   const Spectrum right = spectrum_of(sound.channels[1], sound.rate_hz, zeros);
@@ -101,7 +101,7 @@ Spectrum spectrum_of(const Stereo& sound, std::size_t zeros) {
   return both;
 }
 
-// One point of the spectrum of what is under the window already.
+// Returns one point of the spectrum of a signal that is already windowed.
 double power_at(std::span<const double> seen, double step) {
   std::complex<double> sum = 0.0;
   std::complex<double> w = 1.0;
@@ -224,7 +224,8 @@ double t60_s(const Stereo& sound) {
   };
   const std::size_t from = below(std::pow(10.0, -0.5));
   const std::size_t to = below(std::pow(10.0, -2.5));
-  // A sound that ends with the render falls as its integral does, in no time at the end.
+  // A sound that ends together with the render: its integral falls at once at the end, so there is
+  // no slope to measure.
   if (left.empty() || left[0] <= 0.0 || to + 2 >= left.size() ||
       static_cast<double>(to) > 0.95 * static_cast<double>(left.size())) {
     return std::numeric_limits<double>::infinity();
@@ -283,7 +284,8 @@ Pitch pitch_of(const Stereo& sound, double wanted_hz) {
   }
   pitch.partial_hz = 0.5 * (low + high);
 
-  // Whose first eight harmonics are the loudest; what lies between them speaks against it.
+  // Chooses the frequency whose first eight harmonics are the loudest; energy between the harmonics
+  // counts against it.
   double best = -1.0;
   for (double hz = 20.0; hz < 5000.0; hz *= std::exp2(1.0 / 48.0)) {
     double salience = 0.0;

@@ -1,4 +1,4 @@
-// tests: what a sound measures, by nothing but the sound.
+// tests: measurements of a sound, from its samples only.
 #pragma once
 
 #include <array>
@@ -22,34 +22,37 @@ double decibels(double ratio);  // 20 log10, at least -200
 double peak_of(const Stereo& sound);
 bool is_finite(const Stereo& sound);
 
-// Of the louder channel under a Hann window, which keeps what is heard out of it.
+// Returns the DC offset of the louder channel, under a Hann window, which suppresses audible
+// frequencies.
 double offset_of(const Stereo& sound);
 
-// Integrated loudness after ITU-R BS.1770, gated, by libebur128.
+// Integrated loudness by ITU-R BS.1770, gated, computed by libebur128.
 double loudness_lufs(const Stereo& sound);
 
 double correlation_of(const Stereo& sound);
-double mono_loss_db(const Stereo& sound);  // of the sum's energy against the channels' mean
+// Ratio of the energy of the mono sum to the mean of the channels.
+double mono_loss_db(const Stereo& sound);
 
-// Until the energy of 5 ms comes within 3 dB of the largest of the first second, or of `steady`: of
-// the median from half a second on.
+// Returns the time until the energy of 5 ms comes within 3 dB of the maximum of the first second,
+// or, if `steady`, of the median from half a second on.
 double attack_s(const Stereo& sound, bool steady);
 
-// From the slope of Schroeder's backward integral between -5 and -25 dB, continued to -60 dB; the
-// noise of a sound that does not decay gives infinity.
+// Returns the T60 from the slope of Schroeder's backward integral between -5 and -25 dB,
+// extrapolated to -60 dB. A steady noise gives infinity.
 double t60_s(const Stereo& sound);
 
-// The centre of gravity of the magnitude spectrum from 20 Hz to 16 kHz.
+// Spectral centroid of the magnitudes from 20 Hz to 16 kHz.
 double centroid_hz(const Stereo& sound);
 
-// What an ear could take for the pitch.
+// Frequencies that a listener could hear as the pitch.
 struct Pitch {
-  double partial_hz = 0.0;   // the peak nearest to the frequency that was asked for
-  double heard_hz = 0.0;     // whose harmonics have the most to say, between 20 Hz and 5 kHz
-  double level_db = -200.0;  // of the partial, to the strongest one
+  double partial_hz = 0.0;  // the peak nearest to the requested frequency
+  double heard_hz = 0.0;  // the frequency with the strongest harmonics, between 20 Hz and 5 kHz
+  double level_db = -200.0;  // level of the partial relative to the strongest one
 };
 
-// By the spectrum under a Hann window, its peaks refined by golden sections to the rounding.
+// Finds the pitch from the spectrum under a Hann window. Golden-section search refines the peaks to
+// rounding precision.
 Pitch pitch_of(const Stereo& sound, double wanted_hz);
 
 double cents(double hz, double from_hz);

@@ -102,8 +102,8 @@ Played played(const Scene& scene, double seconds, const std::vector<Event>& even
   return out;
 }
 
-// The sixth difference of a smooth morph contains only a little of the highest partials; a step of
-// 1 contributes 20.
+// The sixth difference of a smooth morph contains only a small part of the highest partials; a step
+// of 1 contributes 20.
 double largest_sixth_difference(std::vector<double> y) {
   for (int order = 0; order < 6; ++order) {
     for (std::size_t n = 0; n + 1 < y.size(); ++n) {

@@ -34,7 +34,7 @@ struct Harness {
                   [this](const std::string& text) { news.set_value(text); }};
   std::vector<std::vector<float>> buffers;
 
-  // Returns the console's output for a line.
+  // Runs a line and returns the console's output.
   std::string say(const std::string& line) {
     said.clear();
     console.run_line(line);

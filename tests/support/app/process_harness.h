@@ -10,7 +10,7 @@ inline constexpr double rate = 44100.0;
 inline constexpr std::size_t fade_frames = 2205;  // 50 ms
 
 inline PlayingEngine* sounding(const std::string& text, const Preset& preset, std::uint32_t serial) {
-  // The direct form rounds alike for any division into blocks.
+  // The direct form rounds the same for any division into blocks.
   auto compiled = compile_network(network_of(text), preset, {.method = Method::direct});
   REQUIRE(compiled);
   return new PlayingEngine{std::move(compiled->engine), serial};
@@ -63,7 +63,7 @@ struct Harness {
   }
   const std::vector<double>& y() const { return out[0]; }
 
-  // Sends events as OSC does, with a time tag and without.
+  // Sends events with a time tag, as OSC does.
   bool at(std::int64_t frame, const Event& event, std::size_t times = 1) {
     return process.send_ahead(std::vector<TimedEvent>(
         times, {.event = event, .timing = TimedEvent::When::at_frame, .when = frame}));

@@ -55,7 +55,7 @@ class NetworkWriter {
   std::string label() { return "@x" + std::to_string(labels_++); }
   void add(const std::string& lines) { lines_.push_back(lines + "\n"); }
 
-  // A mass, or a place on a macro.
+  // Returns a random mass or place on a macro.
   std::string some() { return ends_[random_.below(ends_.size())]; }
 
   std::string mass() {
@@ -71,7 +71,7 @@ class NetworkWriter {
       case 3:
         return "osc 1.5 l [0.5 * z] " + start;
       case 4:
-        return "mass m " + number(0.0, 0.2) + " " + start;  // With gravity.
+        return "mass m " + number(0.0, 0.2) + " " + start;  // with gravity
       default:
         return "mass m " + start;
     }
@@ -284,7 +284,7 @@ class NetworkWriter {
     }
   }
 
-  // A nonlinear link from some mass to `end`.
+  // Adds a nonlinear link from a random mass to `end`.
   void add_bent(const std::string& end) {
     const std::string mass = some();
     if (mass == end) {

@@ -16,7 +16,8 @@
 namespace ressort::reference {
 
 using Real = long double;
-using Number = const Real*;  // Lives in the simulator, so that a parameter can change it.
+// A pointer into the simulator, so that a parameter can change the number.
+using Number = const Real*;
 
 inline Real sgn(Real x) {
   return x > 0 ? 1 : x < 0 ? -1 : 0;
@@ -119,7 +120,7 @@ class PositionInput : public Point {
 // |p - i|), with p the coordinate in nodes: X = sum w_i x_i, F_i += w_i F.
 class MacroPoint : public Point {
  public:
-  // For a body: `rows` places, with a displacement per mode at each, [place][mode].
+  // For a body: `rows` places, with a displacement per mode at each place; [place][mode].
   MacroPoint(std::vector<Point*> nodes, std::size_t rows, std::size_t columns, Number u, Number v,
              std::vector<Real> shapes = {})
       : Point(0, 0),

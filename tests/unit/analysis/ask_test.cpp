@@ -239,7 +239,7 @@ TEST_CASE("unreachable targets are reported with the bound that limits them", "[
   CHECK_FALSE(top->is_reached);
   CHECK(top->values[0] == 0.9);
   CHECK(*top->reached[static_cast<std::size_t>(AskedFigure::f0)] ==
-        Approx(highest_hz).epsilon(1e-4));  // Z shifts it a little.
+        Approx(highest_hz).epsilon(1e-4));  // Z shifts the frequency a little.
   REQUIRE_FALSE(top->held.empty());
   CHECK(top->held[0].index == 0);
   CHECK(top->held[0].is_highest);

@@ -7,7 +7,7 @@ namespace {
 
 using namespace support;
 
-// The largest eigenvalue of M^-1 K, by power iteration over the network's springs.
+// Returns the largest eigenvalue of M^-1 K, by power iteration over the network's springs.
 double stiffest(const Network& network) {
   const auto values = parameter_values(network);
   std::vector<double> x(network.masses.size());
@@ -45,7 +45,7 @@ TEST_CASE("the edge bound equals hand-computed values", "[bound]") {
   CHECK(factor_of(scenes::bowed_string()) < factor_of(scenes::string("s", 150, "0.3", "0.001")));
   // An oscillator: K/M and 2 Z/M.
   CHECK(factor_of("@o osc 2. 0.5 0.1 0. 0.") == Approx((bound_limit - .1) / .25).epsilon(1e-14));
-  // With half the step K counts a quarter, Z a half.
+  // At half the step K counts a quarter and Z a half.
   CHECK(factor_of("@o osc 2. 0.5 0.1 0. 0.", 0.5) ==
         Approx((bound_limit - .05) / .0625).epsilon(1e-14));
 }
@@ -75,7 +75,7 @@ TEST_CASE("the edge bound handles unlimited networks and excessive dampers", "[b
   CHECK(factor_of(mass_and_ground + "@d damper @m @g 3.9") == 1e9);
   CHECK(factor_of(mass_and_ground + "@d damper @m @g 4") <= 0.0);
   CHECK(factor_of("@o osc 1. 0.5 2. 0. 0.") <= 0.0);
-  // They are too strong: x is multiplied by 1 - Z/M < -1 in each step.
+  // The dampers are too strong: each step multiplies x by 1 - Z/M < -1.
   CHECK(growth(network_of(mass_and_ground + "@d damper @m @g 4.1\n@out1 posOutput @m"), 1.0) >
         1e10);
   CHECK(growth(network_of(mass_and_ground + "@d damper @m @g 3.9\n@out1 posOutput @m"), 1.0) < 10);

@@ -277,7 +277,7 @@ TEST_CASE("every law counts in the proof with its steepest slope", "[stability]"
       network_of("@m mass 1. 0. 0.\n@g ground 0.\n@s spring @m @g 1\n@b nlBow @m @g 1 0.1\n");
   const double root = -2.0 / 3.0 + std::sqrt(4.0 / 9.0 + 4.0);
   CHECK(Stability(bowed, 1.0).stiffness_factor(as_written(bowed)) == exactly(root * root));
-  // With half the step K counts a quarter, Z a half: 4 = K/4 + Z.
+  // At half the step K counts a quarter and Z a half: 4 = K/4 + Z.
   const Network half = network_of("@p param 1.\n@o osc 1. p 0.1 0. 0.\n");
   CHECK(Stability(half, 0.5).safe_range(as_written(half), 0, 1.0)->highest == exactly(15.6));
 }
@@ -292,11 +292,11 @@ TEST_CASE("a parameter's limit is found through formulas", "[stability]") {
   CHECK(lowest(osc("2.", "0.1/p"), "p") == exactly(0.1 / 8.0));
   CHECK(lowest(osc("2*p", "0.1"), "p") == exactly(0.0125));
   CHECK(std::isinf(highest(osc("2.", "1+sin(p)"), "p")));
-  // One grows while the other falls: both are affine, so this is exact, too.
+  // One argument grows while the other falls. Both are affine, so the result is exact here too.
   CHECK(highest("@p param 0.3\n@g ground 0.\n@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n"
                 "@l spring @g @a 8*p\n@n spring @g @b 3-p\n",
                 "p") == exactly(0.5));
-  // No stable value around the start, nor on the other side of 0.
+  // No value is stable, neither around the start nor on the other side of 0.
   const Network lost = network_of(
       "@p param 0.3\n@g ground 0.\n@a mass 1. 0. 0.\n"
       "@l spring @g @a p\n@n spring @g @a 5\n");
@@ -347,7 +347,7 @@ TEST_CASE("a place on a string counts with the masses around it", "[stability]")
 }
 
 TEST_CASE("links at places that move count at the worst of them", "[stability]") {
-  // Two strings joined at moving places: x_a^2 and x_b^2 twice each, at most at one mass.
+  // Two strings joined at moving places: x_a^2 and x_b^2 count twice each, and at most at one mass.
   Eigen::MatrixXd a(3, 3);
   a << 3.0, 0.5, 0.0, 0.5, 3.0, 0.5, 0.0, 0.5, 3.0;
   Eigen::MatrixXd b(2, 2);
@@ -357,8 +357,8 @@ TEST_CASE("links at places that move count at the worst of them", "[stability]")
                 "@b string 4 1. 0.3 0. 0. 0.\n@l spring [@a u] [@b v] k\n",
                 "k") == Approx(0.5 / most).epsilon(2e-6));
 
-  // Chains in a row, held at both ends and joined at places moved by audio. The sum over all nodes
-  // would allow springs of 0.83 of this. The limit is nowhere exceeded:
+  // Chains in a row, held at both ends and joined at places moved by audio. A sum over all nodes
+  // would allow springs of 0.83 of this. The limit is never exceeded:
   const auto joined = [](const std::string& k, auto&& place) {
     std::string text = "@g ground 0.\n";
     for (int i = 1; i <= 4; ++i) {
@@ -387,8 +387,7 @@ TEST_CASE("links at places that move count at the worst of them", "[stability]")
         joined(show(k), [&](int) { return is_one ? same : show(random.uniform(0.0, 1.0)); }));
     CHECK(Stability(fixed, 1.0).prove(as_written(fixed)) == Verdict::stable);
   }
-  // A link that may be unstable only somewhere is not called unstable; one that is unstable
-  // everywhere is.
+  // A link that may be unstable at some places is not reported; one that is unstable everywhere is.
   const auto verdict = [&](const std::string& stiff) {
     const Network other =
         network_of(sound.substr(sound.find('\n') + 1).insert(0, "@k param " + stiff + "\n"));

@@ -92,7 +92,7 @@ TEST_CASE("Odd harmonics have the descriptors of other programs", "[timbre]") {
   CHECK(*shape->kurtosis == near(3.30346491));
   CHECK(*shape->decrease == near(-2.0));
 
-  // As harmonics, the even ones are present and silent.
+  // The even ones are present as harmonics, but silent.
   const auto all = harmonics_of(harmonics(9, 2), 220.0);
   REQUIRE(all.size() == 9);
   CHECK(all[3].amplitude == 0.0);
@@ -269,7 +269,7 @@ TEST_CASE("Descriptors of modes in a frame match the synthesised sound", "[timbr
   for (const auto& frame : expected) {
     const auto lines = partials_in_frame(partials, {Window::hann, 2048, frame.at}, rate);
     REQUIRE(lines.size() == 5);
-    // As many digits as are known.
+    // Compared to the known digits.
     CHECK(spectral_shape(lines, frame.kind)->centroid_hz ==
           Approx(frame.centroid_hz).margin(0.005));
   }
@@ -321,7 +321,7 @@ TEST_CASE("A frame of harmonics has the descriptors of other programs", "[timbre
   REQUIRE(shape);
   CHECK(shape->centroid_hz == near(1600.3929));
   CHECK(shape->spread_hz == near(1250.92932));
-  CHECK(*shape->skewness == Approx(0.98432).margin(5e-6));  // As many digits as are known.
+  CHECK(*shape->skewness == Approx(0.98432).margin(5e-6));  // Compared to the known digits.
   CHECK(*shape->kurtosis == Approx(2.82699).margin(5e-6));
   CHECK(shape->rolloff95_hz == 2812.5);
   const auto squared = frame_of(sound, of_power).shape;
@@ -339,7 +339,7 @@ TEST_CASE("A bell's frames match other programs and its own modes", "[timbre]") 
     SpectrumKind kind;
     double centroid_hz;
     double spread_hz;
-    double centroid_bound;  // Of the closed form.
+    double centroid_bound;  // Bound of the error of the closed form.
     double spread_bound;
   } frames[] = {{0, magnitude, 555.519845, 566.711753, 0.01, 0.034},
                 {0, of_power, 352.572113, 281.340833, 0.0014, 0.052},
@@ -408,7 +408,7 @@ TEST_CASE("A sound's harmonics have the descriptors of its partials", "[timbre]"
   CHECK(*stiff.harmonics->odd_to_even == Approx(3.23546315).epsilon(1e-3));
   CHECK(stiff.harmonics->tristimulus[0] == Approx(0.341417).epsilon(1e-3));
   CHECK(*stiff.noisiness < 1e-3);
-  // Nothing between odd harmonics counts as an even one.
+  // No energy between the odd harmonics counts as an even one.
   CHECK(frame_of(odd, magnitude, 220.0).harmonics->odd_to_even.value_or(1e9) > 1e6);
   CHECK(*find_f0(sound, 48000.0) == Approx(220.0).epsilon(1e-4));
   CHECK(*find_f0(odd, 48000.0) == Approx(220.0).epsilon(1e-4));

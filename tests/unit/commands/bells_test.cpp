@@ -17,7 +17,7 @@ namespace {
 
 using namespace support;
 
-// Partials of a model in the order hum, prime and so on; pairs are averaged.
+// Partials of a model in the order hum, prime, tierce and so on; pairs are averaged.
 std::vector<double> partials_of(const std::string& name) {
   const auto text = read_text(std::string(RESSORT_SOURCE) + "/models/" + name + ".mdl", 1 << 20);
   REQUIRE(text);
@@ -34,7 +34,7 @@ std::vector<double> partials_of(const std::string& name) {
 }
 
 // Number of nodal meridians of a mode: the largest Fourier component of the radial motion around
-// the axis. The crown, which turns in some modes, is left out.
+// the axis. The crown is excluded, because it turns in some modes.
 int meridians(const SolidMesh& mesh, const SolidModes& modes, std::size_t mode) {
   std::array<std::complex<double>, 12> around{};
   double widest = 0.0;
@@ -114,8 +114,8 @@ TEST_CASE("Partials of the bells are those of their solids", "[.][bells_everywhe
       const double of_model = partials[place] / partials[bell.partials[0].place];
       const double of_solid = solid[i] / solid[0];
       INFO(bell.name << ", partial " << place << ": " << of_model << ", of the solid " << of_solid);
-      // The prime, in which the wall is stretched, is the last to converge: that of MajorBell is
-      // 1.7 % off with so many unknowns, 3.3 % with a third of them.
+      // The prime stretches the wall and is the last to converge: the prime of MajorBell is 1.7 %
+      // off with this many unknowns, and 3.3 % with a third of them.
       const bool is_late = bell.name == std::string_view("MajorBell") && place == 1;
       CHECK(of_model == Approx(of_solid).epsilon(is_late ? 0.018 : 0.01));
     }

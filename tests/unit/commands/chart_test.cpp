@@ -1,4 +1,4 @@
-// The chart: fronts by hand, and the two references against closed forms and the textbook
+// The chart: Pareto fronts by hand, and the two references against closed forms and the textbook
 // simulator.
 #include "app/commands/chart/chart.h"
 
@@ -138,7 +138,7 @@ TEST_CASE("Errors against the continuous network are those of the theory", "[cha
 }
 
 TEST_CASE("A network at rest is struck, and the sheet says so", "[chart]") {
-  // Displaced from the origin but at rest: no link pulls.
+  // The masses are displaced from the origin but at rest: no link exerts a force.
   const ParsedNetwork parsed = parse_network(
       "@m mass 1. 1. 0.\n@n mass 1. 1. 0.\n@r springDamper @m @n 0.1 0.001\n@out1 posOutput @m\n");
   ChartScene scene{.name = "pair", .network = parsed.network, .is_linear = true};

@@ -125,7 +125,7 @@ TEST_CASE("Attack and decay of a file are those of its envelope", "[description]
   CHECK(note.temporal->temporal_centroid_s == Approx(0.1498184).margin(3e-4));
   CHECK(note.temporal->effective_duration_s == Approx(0.1386458).margin(5e-3));
   CHECK(*note.f0_hz == Approx(440.0).epsilon(1e-4));
-  // The median leaves out frames 60 dB below the loudest: half of this sound.
+  // The median excludes frames 60 dB below the loudest: half of this sound.
   const auto statistics = statistics_of(note);
   CHECK(value(statistics.median, "rms") > 1e-3);
   CHECK(value(statistics.median, "centroid_hz") == Approx(440.0).epsilon(5e-3));
@@ -152,7 +152,7 @@ TEST_CASE("Sounds that cannot be described give errors", "[description]") {
                                       [](double share) { return share < 0.6; });
   REQUIRE_FALSE(stopped);
   CHECK(stopped.error().message == description_stopped);
-  // Silence has frames without figures.
+  // Frames of silence have no figures.
   const auto silence = described(write_sound(folder, "x.wav", {std::vector<double>(5000)}));
   CHECK(silence.frames.size() == 6);
   CHECK_FALSE(silence.temporal);

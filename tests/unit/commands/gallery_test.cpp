@@ -64,7 +64,7 @@ TEST_CASE("T60 is ln(1000) times the time constant", "[gallery]") {
 }
 
 TEST_CASE("The attack lasts until half of the amplitude", "[gallery]") {
-  // A ramp of 0.2 s; windows of 5 ms end where it has passed half, at 0.1 s.
+  // A ramp of 0.2 s; in windows of 5 ms, it passes half at 0.1 s.
   auto samples = sine(2000.0, 1.0, 1.0);
   for (std::size_t n = 0; n < samples.size(); ++n) {
     samples[n] *= std::min(1.0, static_cast<double>(n) / (0.2 * rate_hz));
@@ -77,7 +77,7 @@ TEST_CASE("The attack lasts until half of the amplitude", "[gallery]") {
 
 TEST_CASE("A spectrogram shows the frequency and the level of a sinusoid", "[gallery]") {
   const Sound heard = sound({sine(880.0, 0.5, 2.0)});
-  const Spectrogram shown = find_spectrogram(heard, {0.0, 2.0}, 109, 20);  // a row a semitone
+  const Spectrogram shown = find_spectrogram(heard, {0.0, 2.0}, 109, 20);  // one row per semitone
   const std::size_t row = 60;  // 880 Hz is five octaves above 27.5 Hz
   CHECK(std::fabs(shown.frequency_hz(row) - 880.0) < 1e-6);
   CHECK(std::fabs(shown.at(row, 10) - 20.0 * std::log10(0.5)) < 0.05);

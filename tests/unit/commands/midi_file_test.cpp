@@ -65,7 +65,7 @@ TEST_CASE("Running status, a tempo change and long times are parsed", "[midi_fil
                                           0,    0xff, 0x51, 3,   0x0f, 0x42, 0x40,  // 1 000 000 us
                                           48,   0x93, 62,   1,                      //
                                           0x81, 0x40, 0xc3, 5,                      // 192 ticks
-                                          0,    7} +                                // and again
+                                          0,    7} +  // running status again
                                     end));
   REQUIRE(midi.messages.size() == 5);
   check(midi, 0, 0.0, {0x93, 60, 100});
@@ -79,7 +79,7 @@ TEST_CASE("Running status, a tempo change and long times are parsed", "[midi_fil
 TEST_CASE("Tracks of type 1 play together, with the tempo of any track", "[midi_file]") {
   const MidiFile midi =
       read(header(1, 2, 480) +
-           // Twice as fast after a quarter note: 250 000 us.
+           // The tempo doubles after a quarter note: 250 000 us.
            track(Bytes{0x83, 0x60, 0xff, 0x51, 3, 0x03, 0xd0, 0x90} + end) +
            Bytes{'X', 'F', 'I', 'H', 0, 0, 0, 2, 1, 2} +  // a chunk of another kind
            track(Bytes{0, 0x90, 60, 1, 0x87, 0x40, 0x80, 60, 64, 0x83, 0x60, 0xff, 0x2f, 0}) +
@@ -91,7 +91,8 @@ TEST_CASE("Tracks of type 1 play together, with the tempo of any track", "[midi_
 }
 
 TEST_CASE("SMPTE times ignore the tempo", "[midi_file]") {
-  // 25 frames of 40 ticks are a second; 29 stands for 30 drop frame, 30000 / 1001 a second.
+  // 25 frames of 40 ticks are a second. The value 29 means 30 drop frame, so 30000 / 1001 frames
+  // are a second.
   const Bytes events = track(Bytes{0, 0xff, 0x51, 3, 1, 0, 0, 0x87, 0x68, 0x90, 1, 1} + end);
   check(read(header(0, 1, (256 - 25) << 8 | 40) + events), 0, 1.0, {0x90, 1, 1});
   check(read(header(0, 1, (256 - 29) << 8 | 40) + events), 0, 25.0 * 1001.0 / 30000.0,
@@ -100,9 +101,10 @@ TEST_CASE("SMPTE times ignore the tempo", "[midi_file]") {
 
 TEST_CASE("SysEx is passed on whole, in parts and escaped", "[midi_file]") {
   const MidiFile midi = read(
-      header(0, 1, 96) + track(Bytes{0,  0xf0, 4, 0x7e, 0x7f, 9,    0xf7,  // whole
-                                     0,  0xf0, 2, 0x43, 0x12,              // begins
-                                     96, 0xf7, 2, 0x01, 0xf7,              // continues and ends
+      // a complete exclusive message
+      header(0, 1, 96) + track(Bytes{0,  0xf0, 4, 0x7e, 0x7f, 9,    0xf7,
+                                     0,  0xf0, 2, 0x43, 0x12,  // the first part of one
+                                     96, 0xf7, 2, 0x01, 0xf7,  // its second and last part
                                      0,  0xf7, 1, 0xf8, 0,    0x80, 1,    2} +  // a clock, escaped
                                end));
   REQUIRE(midi.messages.size() == 5);
@@ -168,11 +170,11 @@ TEST_CASE("A rendered MIDI file starts at its frame and ends in silence", "[midi
   const std::vector<double>& left = sound->channels[0];
   const auto frame =
       std::find_if(left.begin(), left.end(), [](double y) { return y != 0.0; }) - left.begin();
-  // The strike is in frame 24000; the wave takes a frame per link to the output. The limiter is
-  // off.
+  // The strike is in frame 24000; the wave moves one link per frame towards the output. The limiter
+  // is off.
   CHECK(frame >= 24000);
   CHECK(frame < 24010);
-  // The file lasts 1.5 s; the decay ends long before the longest wait of a minute.
+  // The file lasts 1.5 s; the decay ends long before the longest tail of a minute.
   CHECK(static_cast<double>(rendered->frames) >= 1.5 * 48000.0);
   CHECK(static_cast<double>(rendered->frames) < 20.0 * 48000.0);
 }

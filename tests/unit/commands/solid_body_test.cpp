@@ -101,7 +101,7 @@ TEST_CASE("A bar becomes a body that moves like a beam", "[solid_body]") {
   options.picture = workshop.file("bar.svg");
   REQUIRE(solid_body(options) == 0);
   const WrittenBody body = read_body(options.output);
-  // 0.314 kg in micrometres and newtons at 44100 steps a second.
+  // 0.314 kg in units of micrometres and newtons at 44100 steps a second.
   CHECK(body.m == Approx(0.314 * 44100.0 * 44100.0 * 1e-6).epsilon(1e-8));
   CHECK(body.places == std::vector<std::string>{"end", "middle"});
   REQUIRE(body.modes.size() == 6);
@@ -226,7 +226,7 @@ TEST_CASE("Both meshers agree on a bowl and on a hollow solid", "[solid_body]") 
       bodies.push_back(read_body(options.output));
     }
     CHECK(bodies[0].m == Approx(bodies[1].m).epsilon(1e-6));
-    // Gmsh remeshes round surfaces, TetGen keeps them.
+    // Gmsh remeshes round surfaces, TetGen preserves them.
     for (std::size_t i = 0; i < 8; ++i) {
       CHECK(bodies[0].modes[i].frequency_hz ==
             Approx(bodies[1].modes[i].frequency_hz).epsilon(1.5e-2));

@@ -32,7 +32,7 @@ TEST_CASE("A preset that names a missing input or parameter is refused with its 
   error = error_of(scenes::poly_triangle(),
                    "[[control]]\nfrom = \"note\"\nto = \"in1\"\nhow = \"bow\"");
   CHECK(error.message == "'in1' is a force input, but this gesture needs a position input");
-  // The engine has an audio channel for each input.
+  // The engine has one audio channel for each input.
   error = error_of(model, "[[control]]\nfrom = \"audio1\"\nto = \"m_K\"");
   CHECK(error.message == "an audio channel drives an input, not a parameter");
 }
@@ -47,7 +47,7 @@ TEST_CASE("An instrument lists its parameters and inputs", "[compile]") {
   CHECK(instrument.parameters[0].value == 0.2);
   CHECK(instrument.parameters[0].minimum == 0.1);
   CHECK(instrument.parameters[0].maximum == 0.25);
-  CHECK(instrument.parameters[1].value == 0.001);  // as the model has it
+  CHECK(instrument.parameters[1].value == 0.001);  // as in the model
   REQUIRE(instrument.inputs.size() == 1);
   CHECK(instrument.inputs[0].is_force);
   CHECK(instrument.inputs[0].attached_to == "m_m1");
@@ -56,9 +56,9 @@ TEST_CASE("An instrument lists its parameters and inputs", "[compile]") {
   CHECK(instrument.masses == 3);
   CHECK(instrument.links == 4);
   CHECK(player.compiled.engine->parameter(0) == 0.2);
-  // The margin is that of the worst corner of the ranges: m_K = .25, m_Z as it is.
-  // The worst motion is that of m0 against m1 and m2 together: with s the factor,
-  // (4 - .024 - .55 s)(4 - .002 - .25 s) = 2 (.002 + .25 s)^2.
+  // The margin is that of the worst corner of the ranges: m_K = .25, m_Z unchanged. The worst
+  // motion is m0 against m1 and m2 together. With the factor s, (4 - .024 - .55 s)(4 - .002 - .25
+  // s) = 2 (.002 + .25 s)^2.
   CHECK(instrument.stiffness_margin ==
         Approx((3.1949 - std::sqrt(3.1949 * 3.1949 - .05 * 15.89604)) / .025).epsilon(1e-12));
   REQUIRE(instrument.mode);
@@ -79,7 +79,7 @@ TEST_CASE("The plan lists the connected components and their forms", "[compile]"
                  "@in2 frcInput @b_m2\n@out3 posOutput @free\n@out4 posOutput @lone\n"),
       44100.0, true);
   const Planned plan = make_plan(machine, {}, Method::direct);
-  REQUIRE(plan.parts.size() == 3);  // the largest first, all small ones as one
+  REQUIRE(plan.parts.size() == 3);  // the largest part first, all small parts as one
   CHECK(plan.parts[0].masses == 5);
   CHECK(plan.parts[0].links == 7);
   CHECK(plan.parts[1].masses == 3);
@@ -134,7 +134,7 @@ TEST_CASE("A requested method is used if it can compute the part", "[compile]") 
 }
 
 TEST_CASE("The gain of a model without a preset makes a forte note peak at 0.5", "[compile]") {
-  // Small models, of which a whole second is played.
+  // Small models, played for a whole second.
   for (const std::string& text :
        {scenes::poly_triangle(), scenes::iplay_the_triangle(), ringing_string()}) {
     const Network network = network_of(text);
@@ -174,7 +174,7 @@ TEST_CASE("Rescaling keeps pitch and decay at another sample rate", "[compile]")
   CHECK(left == Approx(std::exp(-0.0001 * 0.2375 * 44100.0)).epsilon(0.02));
   for (const double rate_hz : {22050.0, 48000.0, 96000.0}) {
     const auto [other_hz, other_left] = ring(rate_hz, true);
-    CHECK(std::fabs(other_hz - hz) <= 2.0);  // half a period more or less in a quarter second
+    CHECK(std::fabs(other_hz - hz) <= 2.0);  // plus or minus half a period in a quarter second
     CHECK(other_left == Approx(left).epsilon(0.02));
   }
   CHECK(ring(88200.0, false).first == Approx(2.0 * hz).margin(4.1));

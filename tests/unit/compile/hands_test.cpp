@@ -61,7 +61,7 @@ TEST_CASE("A control in swings goes from off to pressed at any scale of a model"
   std::vector<double> losses;
   for (const double scale : {1.0, 1e-3, 1e3}) {
     INFO(scale);
-    // Off sounds as without the control. The gain makes all equally loud.
+    // At 0 the control has no effect. The gain makes all equally loud.
     const std::vector<double> off = struck_with(scale, 0.0);
     double apart = 0.0;
     for (std::size_t n = 0; n < off.size(); ++n) {
@@ -69,7 +69,7 @@ TEST_CASE("A control in swings goes from off to pressed at any scale of a model"
     }
     CHECK(apart < 1e-9);
     CHECK(peak(off) > 0.4);
-    // The felt damps more and more, and nearly everything when pressed.
+    // The felt damps more and more, until it damps nearly everything when pressed.
     double before_db = loss_db(off);
     for (const double lever : {0.5, 0.55, 0.6, 0.7}) {
       INFO(lever);

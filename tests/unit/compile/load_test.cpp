@@ -165,7 +165,7 @@ TEST_CASE("A load can be stopped at any point and frees all memory", "[load]") {
     return default_preset(parsed.network, false);
   }();
   std::vector<std::string> stages;
-  // Stops the load after this number of progress calls, and returns the number of calls.
+  // Cancels the load after this number of progress calls, and returns the number of calls.
   const auto load = [&](std::size_t most) {
     std::size_t looks = 0;
     const Progress progress(

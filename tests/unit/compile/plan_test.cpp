@@ -1,5 +1,4 @@
-// The choice among a part's forms by measured times. The clock is a function that returns times of
-// the test's own.
+// The choice among a part's forms by measured times. The test supplies the clock.
 #include <map>
 
 #include "core/compile/plan.h"
@@ -10,7 +9,7 @@ namespace {
 
 using namespace support;
 
-// Chains by its estimate; the direct form, batch or modes may be cheaper.
+// The estimates prefer chains; the direct form, batch or modes may be cheaper.
 const std::string picked = scenes::string("s", 12, "0.1", "0.01") +
                            "@in1 posInput 0.\n@pick nlPluck @in1 @s_m2 0.05 0.01\n" +
                            scenes::output(1, "s_m4");
@@ -19,7 +18,7 @@ Machine machine_of(const std::string& text) {
   return make_machine(network_of(text), 44100.0, true);
 }
 
-// Takes `ns` per sample for the forms that it names and 1000 for all others, and counts its calls.
+// Returns `ns` per sample for the named forms and 1000 for all others, and counts its calls.
 struct FakeClock {
   std::map<std::string, double> ns;
   std::size_t calls = 0;
@@ -65,7 +64,7 @@ TEST_CASE("candidates are timed, and the cheapest is chosen", "[plan]") {
             std::string::npos);
       others += form != first ? 1 : 0;
     } else {
-      CHECK(part.form == first);  // its estimate was too far behind
+      CHECK(part.form == first);  // its estimate was too far behind to be measured
       CHECK(part.measured_ns == Approx(1000.0));
     }
   }
@@ -100,7 +99,7 @@ TEST_CASE("a measurement that is kept is not repeated", "[plan]") {
   // The number of voices is part of the key.
   planned(machine, {.timings = &timings}, 8);
   CHECK(clock.calls > calls);
-  // The values of coefficients are not.
+  // The values of coefficients are not part of the key.
   const std::size_t before = clock.calls;
   const Machine stiffer = machine_of(picked + "@unused param 1.\n");
   planned(stiffer, {.timings = &timings});
@@ -137,7 +136,7 @@ TEST_CASE("a plan repeats the forms of an earlier one", "[plan]") {
 }
 
 TEST_CASE("several steps a sample are measured in every form that steps them", "[plan]") {
-  // A budget of cents that a cubic spring keeps by more steps alone.
+  // With a cubic spring, only more steps per sample keep a budget of cents.
   const std::string bent = scenes::string("s", 12, "0.1", "0.001") +
                            "@b nlSpring3 @s_m2 @s_m7 0.05 0.5 0.\n@in1 frcInput @s_m3\n" +
                            scenes::output(1, "s_m4");

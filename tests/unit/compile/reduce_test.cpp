@@ -91,14 +91,14 @@ TEST_CASE("A mass that no output hears is left out", "[reduce]") {
   const std::string pair =
       "@g ground 0.\n@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n@s springDamper @a @b .1 0.\n"
       "@out1 posOutput @b\n";
-  CHECK(said(pair) == "");  // a mass may be struck
+  CHECK(said(pair) == "");  // a mass that no output hears may still be struck
   CHECK(said(pair + "@in1 frcInput @a\n") == "");
   CHECK(said(pair + "@in1 posInput 0.\n@t springDamper @in1 @a .1 0.\n") == "");
   // A ground passes no motion on...
   const std::string heard = pair + "@in1 frcInput @a\n@c mass 1. 0. .1\n";
   CHECK(said(heard + "@t springDamper @g @c .1 0.\n@u springDamper @g @a .1 0.\n") ==
         "1 mass that no output hears");
-  // ...but an output may hear the force on it.
+  // ...but an output can measure the force on a ground.
   CHECK(said(heard + "@t springDamper @g @c .1 0.\n@out2 frcOutput @g\n") == "");
   // A link without strength connects nothing; one whose strength is a parameter does.
   CHECK(said(heard + "@t springDamper @a @c 0. 0.\n") ==
@@ -123,7 +123,7 @@ TEST_CASE("Parallel springs are merged into one", "[reduce]") {
   const auto play = [](const std::string& text) {
     support::Player player(text, {}, {.method = Method::direct});
     player.run(20'000);
-    player.run(20'000, {support::parameter(0, 0, .06)});  // turned on the way
+    player.run(20'000, {support::parameter(0, 0, .06)});  // the parameter changes while it plays
     return player;
   };
   const support::Player first = play(one);

@@ -158,7 +158,7 @@ TEST_CASE("Passive links are not part of the proof", "[stability_check]") {
   is_told("nlSpringDamper @m @g 0.1 0.1 -0.2 0.01", "stiffness -0.2");
   is_told("nlSpringDamper @m @g -0.1 0. 0.2 0.01", "stiffness -0.1");
   CHECK(said_to(ground + "@x nlSpringDamper @m @g -0.1 0.1 0.2 0.01\n") == "");
-  // `check` prints the limits of the network that was proved.
+  // `check` prints the limits of the network that the proof covers.
   const auto made = compile_network(network_of(strong + "0.5\n"), {}, {});
   REQUIRE(made);
   CHECK(Stability(made->stability.proved, 1.0).certify({{}, {}}).verdict == Verdict::stable);
@@ -173,7 +173,7 @@ TEST_CASE("Ranges keep the stiffness of passive links positive", "[stability_che
     REQUIRE(compiled);
     return std::move(compiled->stability);
   };
-  // The preset's value counts, however the formula is written.
+  // The value in the preset counts, whatever the formula looks like.
   const StabilityCheck usual = made(50., .1, 100.);
   CHECK(usual.verdict == Verdict::stable);
   CHECK(usual.parameters[0].maximum == 100.);
@@ -301,7 +301,7 @@ TEST_CASE("A range that is too wide is narrowed and reported at its line", "[sta
                       warnings));
   CHECK(warnings == std::vector<std::string>{"here.toml:4:1: warning: 'M' is kept above 0.0255001; "
                                              "below it the model is not stable"});
-  // With `force` the range stays as requested.
+  // The option `force` keeps the requested range.
   warnings.clear();
   const auto forced = compile_scene(scene_of(oscillator, with_range("K", 0.5, 0.1, 5.0)),
                                     {.force = true}, warnings);
@@ -312,7 +312,7 @@ TEST_CASE("A range that is too wide is narrowed and reported at its line", "[sta
 
 TEST_CASE("Ranges are stable in every common corner, and no smaller than necessary",
           "[stability_check]") {
-  // The limits of each alone are 1.3 and 0.6; together they allow less than requested.
+  // The limit of each parameter alone is 1.3 and 0.6; together they allow less than requested.
   Preset preset = struck(1);
   preset.parameters.push_back({"m_K", 0.1, 0.01, 1.2, {}});
   preset.parameters.push_back({"m_Z", 0.001, 0.0, 0.5, {}});
@@ -400,7 +400,7 @@ TEST_CASE("No controller, event or start value leaves a parameter's stable range
 }
 
 TEST_CASE("A high key is lowered before a parameter makes it unstable", "[stability_check]") {
-  // m_K may grow four times, or keys may use 11.6 times the stiffness, but not both.
+  // Either m_K may grow four times, or keys may use 11.6 times the stiffness, but not both.
   Player player(scenes::poly_triangle(), struck(1));
   const ParameterInfo& stiffness = player.compiled.instrument.parameters[0];
   CHECK(stiffness.maximum == 0.4);
@@ -488,7 +488,7 @@ TEST_CASE("An audio input takes no range of other parameters and makes no stiffn
     silent.replace(silent.find("audioParam @in1"), 15, "param 0.");
     auto alone = compile_network(network_of(silent), {}, {});
     REQUIRE(alone);
-    // Parameters whose default ranges are unstable together are narrowed, and leave a tenth to
+    // Parameters whose default ranges are unstable together are narrowed, with a tenth reserved for
     // audio.
     bool is_crowded = false;
     for (std::size_t i = 0; i < 3; ++i) {

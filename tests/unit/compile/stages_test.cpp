@@ -1,4 +1,4 @@
-// Each stage of compiling by itself, on networks small enough to solve by hand.
+// Each stage of compilation separately, on networks small enough to solve by hand.
 #include "core/analysis/linear.h"
 #include "core/compile/accuracy/pitches.h"
 #include "core/compile/instrument.h"
@@ -125,7 +125,7 @@ TEST_CASE("The margin for keys shrinks towards the limits of a parameter", "[sta
   // At half the rate K counts four times, Z twice.
   CHECK(find_margins(network, {}, at(0.5), {}, 2.0).whole == Approx(7.6 / 2.0).epsilon(1e-12));
   CHECK(find_margins(network, {}, at(0.5), {}, 1.0).away.empty());
-  // Passive links limit nothing.
+  // Passive links have no stability limit.
   const Network floor = network_of("@g ground 0.\n@m mass 1. 0. 1.\n@c contact @g @m 3. 0.\n");
   const std::vector<LinkScheme> passive = {{Scheme::discrete_gradient}};
   CHECK(find_margins(floor, {}, {}, {}, 1.0).whole == Approx(4.0 / 3.0).epsilon(1e-12));
@@ -139,7 +139,7 @@ TEST_CASE("The bound of a resting part is the compliance of its springs", "[stag
   const auto bounds = [&](Network heard) {
     return make_rest_bounds(heard, make_machine(heard, 44100.0, true), {});
   };
-  CHECK_FALSE(bounds(network)[0]);  // a force is heard
+  CHECK_FALSE(bounds(network)[0]);  // because an output reads a force
   Network silent = network;
   silent.outputs.pop_back();
   const auto bound = bounds(silent)[0];

@@ -404,7 +404,7 @@ TEST_CASE("without a terminal, lines are read until quit", "[console]") {
   CHECK(has(harness.said, "model   none"));
   CHECK(has(harness.said, "no model is loaded yet"));
   CHECK(harness.said.find("model   none") ==
-        harness.said.rfind("model   none"));  // Nothing is executed after quit.
+        harness.said.rfind("model   none"));  // The console executes no command after quit.
 }
 
 TEST_CASE("the end of the input ends only the console", "[console]") {
@@ -416,7 +416,7 @@ TEST_CASE("the end of the input ends only the console", "[console]") {
                   [&](const std::string&) { promise.set_value(); }, {});
   {
     Terminal terminal(console, [&] { has_quit = true; });
-    input.type("status");  // Without its line end.
+    input.type("status");  // Input without a line end.
     input.end();
     REQUIRE(promise.get_future().wait_for(patience) == std::future_status::ready);
   }

@@ -229,7 +229,8 @@ TEST_CASE("memory is limited for any number of senders", "[osc_access]") {
   }
   CHECK(answered == AnswerBudget::max_senders + 1);
   CHECK(budget.senders() == AnswerBudget::max_senders + 1);
-  CHECK(budget.may_answer({0x0c000000, 1}, 1000 * ms));  // A sender without debt frees its entry.
+  // A client that has used no budget frees its entry.
+  CHECK(budget.may_answer({0x0c000000, 1}, 1000 * ms));
 }
 
 TEST_CASE("a reply of many rows is sent in portions", "[osc_access]") {
@@ -254,7 +255,7 @@ TEST_CASE("a reply of many rows is sent in portions", "[osc_access]") {
     rows.push_back({i});
   }
   outlet.answer(to, rows);
-  outlet.answer(to, {{100}});  // Queued behind them.
+  outlet.answer(to, {{100}});  // Replies queued behind the others.
   CHECK(collect() == 0);
   const int wait_ms = outlet.send_due();
   CHECK(wait_ms > 0);
@@ -406,7 +407,8 @@ TEST_CASE("packets load only files below the program's folders", "[osc_access]")
           name + std::string(".toml:1:9: error: its model is outside the "
                              "program's folders, so OSC cannot load it"));
     CHECK(harness.session.load_and_wait(presets /
-                                        (name + std::string(".toml"))));  // A local user may.
+                                        // A local user may load it.
+                                        (name + std::string(".toml"))));
   }
   CHECK(contains(harness.load_by_osc("password"), "password.toml:1:9: error: "));
   // The locally loaded model is still playing.

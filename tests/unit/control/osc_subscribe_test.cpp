@@ -156,7 +156,8 @@ TEST_CASE("an integer velocity is MIDI's, a float is a share", "[osc_subscribe]"
   CHECK(velocity(1.0, "ii") == 1.0 / 127.0);
   CHECK(velocity(1.0, "if") == 1.0);
   CHECK(velocity(0.5, "id") == 0.5);
-  CHECK(velocity(100.0, "if") == 100.0 / 127.0);  // Above 1, so not a share.
+  // A value above 1 is a MIDI velocity and no fraction.
+  CHECK(velocity(100.0, "if") == 100.0 / 127.0);
   CHECK(velocity(1.0, "") == 1.0 / 127.0);        // From a score.
 }
 

@@ -267,12 +267,13 @@ TEST_CASE("time tags keep their distances to the frame", "[osc]") {
   harness.drive(100);
   const auto onsets = harness.onsets(0);
   REQUIRE(onsets.size() == count);
-  CHECK(std::abs(onsets[0] - 9600) < 150);  // As exact as the first block's clock reading.
+  // The error is the error of the first block's clock reading.
+  CHECK(std::abs(onsets[0] - 9600) < 150);
   for (std::size_t k = 1; k < count; ++k) {
     CHECK(onsets[k] - onsets[k - 1] == distance);
   }
 
-  // A time in the past acts immediately, and the sender is told.
+  // A time in the past acts immediately, and the sender gets a message.
   const auto now = static_cast<std::int64_t>(harness.sound[0].size());
   const auto late = harness.client.ask(
       bundle(harness.tag(harness.time_ns(now - 24000)), {message("/in/1/force", {0.1})}));
@@ -383,7 +384,7 @@ TEST_CASE("a bundle without room is rejected whole, and immediate events are acc
               "refused whole: 4096 events can wait for their time; there is no room for 1500 "
               "events more; try again later"));
     CHECK(harness.process.meters().dropped == 1500u * (static_cast<unsigned>(i) + 1));
-    harness.drive(4);  // The audio thread has taken all of them, and they are still waiting.
+    harness.drive(4);  // The audio thread has received all of them, and they are still waiting.
   }
   CHECK(harness.onsets(0).empty());
   harness.client.send(message("/in/1/force", {0.1}));

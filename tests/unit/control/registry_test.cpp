@@ -150,7 +150,7 @@ TEST_CASE("masses are struck by name, those of macros by number", "[registry]") 
     CHECK((*events)[0].model == 9);
     return std::pair{(*events)[0].value, (*events)[0].value2};
   };
-  // In the expanded network the string's masses come after the two, and after the place on it.
+  // The expanded network lists the string's masses after the two masses and the place on it.
   CHECK(struck("/mass/a/strike 1") == std::pair{0.4, 0.0});
   CHECK(struck("/mass/a/strike -0.5") == std::pair{-0.2, 0.0});
   CHECK(struck("/mass/s:2/strike 1") == std::pair{0.4, 4.0});
@@ -179,7 +179,7 @@ TEST_CASE("a parameter driven by an input cannot be set", "[registry]") {
   const auto one = to_events(call("/param/K 0.1"), compiled->instrument, 9);
   REQUIRE_FALSE(one);
   CHECK(one.error().message == "/param/K: input 2 gives it, sample by sample; it cannot be set");
-  // A pattern skips it.
+  // A pattern skips read-only addresses.
   const auto all = to_events(call("/param/* 0.1"), compiled->instrument, 9);
   REQUIRE(all);
   REQUIRE(all->size() == 1);

@@ -13,8 +13,8 @@ const char* const string_text =
     "@k param 0.1\n@z param 0.002\n@s string 20 1. k z 0. 0.\n@in1 frcInput [@s 0.3]\n"
     "@out1 posOutput [@s 0.71]\n";
 
-// For 18 moving masses, by hand: lambda = K (2 sin(pi / 2 / 19))^2, zeta = Z times the same; f and
-// T60 of the published scheme.
+// For 18 moving masses, by hand: lambda = K (2 sin(pi / 2 / 19))^2, and zeta is the same with Z; f
+// and T60 of the published scheme.
 double stiffness_for(double f0_hz, double t60_s, double rate_hz) {
   const double r = std::pow(10.0, -3.0 / (rate_hz * t60_s));
   const double lambda = 1.0 + r * r - 2.0 * r * std::cos(2.0 * M_PI * f0_hz / rate_hz);
@@ -98,7 +98,8 @@ TEST_CASE("an attack can be printed and requested", "[shape_told]") {
   StringHarness fixture;
   Harness& h = fixture.harness;
   const std::string told = squeezed(h.say("shape t60 2"));
-  // Printed although not requested: a struck string rises as fast as the low-pass of 50 Hz.
+  // Printed although it was not requested: the attack of a struck string is that of the 50 Hz
+  // low-pass.
   CHECK(has(told, "attack "));
   CHECK_FALSE(has(told, "attack - -"));
   h.play();

@@ -58,7 +58,7 @@ TEST_CASE("a bundle that does not fit into the future queue is rejected as a who
   CHECK(harness.at(2000, push(), Process::max_ahead - 3000));
   CHECK_FALSE(harness.at(2000, push()));
   harness.run(1001, 77);
-  CHECK(pushed_at(harness.y()) == 1000);  // nothing of the rejected bundle acted
+  CHECK(pushed_at(harness.y()) == 1000);  // no event of the rejected bundle acted
   CHECK(harness.y()[1000] == 3000.0 * faint().gain);
   // Acted events free their places; waiting ones keep theirs.
   CHECK_FALSE(harness.at(3000, push(), 3001));
@@ -83,7 +83,7 @@ TEST_CASE("a full future queue does not block immediate events", "[flood]") {
     harness.run(period, period,
                 is_midi ? std::vector<MidiPacket>{{0, on}} : std::vector<MidiPacket>{});
     CHECK(peak(harness.y()) > 1e-4);
-    // And panic within the next block.
+    // Panic acts within the next block.
     harness.now({.kind = EventKind::panic});
     harness.run(2 * period);
     CHECK(peak(std::span(harness.y()).subspan(period + steal_frames)) == 0.0);
@@ -108,7 +108,7 @@ TEST_CASE("panic discards waiting events, but no later ones", "[flood]") {
     harness.run(2000);
     CHECK(pushed_at(harness.y()) == 2000);
   }
-  // In one block: a bundle, panic, another bundle.
+  // Three events in one block: a bundle, panic, another bundle.
   Harness harness;
   harness.process.slot.offer(sounding(clock_text, faint(), 1));
   harness.at(500, push());

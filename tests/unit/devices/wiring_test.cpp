@@ -48,7 +48,7 @@ TEST_CASE("a removed connection stays removed until a person makes it again", "[
   CHECK_FALSE(wiring.is_in_doubt());
   wiring.mark_all_missing();
   CHECK(wiring.missing() == std::vector<Cable>{speaker});
-  CHECK(wiring.knows(mixer));  // so that nothing reconnects it
+  CHECK(wiring.knows(mixer));  // so that the program does not reconnect it
   CHECK_FALSE(wiring.knows(keyboard));
   look(wiring, {speaker, mixer}, all);
   wiring.mark_all_missing();
@@ -59,8 +59,8 @@ TEST_CASE("a closing client loses its connections first, which does not count as
           "[wiring]") {
   Wiring wiring;
   look(wiring, {speaker, mixer}, all);
-  look(wiring, {speaker}, all);         // between its connections and its ports
-  look(wiring, {speaker}, all, false);  // and once more, as something else moves
+  look(wiring, {speaker}, all);  // after its connections and before its ports
+  look(wiring, {speaker}, all, false);  // again, because another connection changed
   CHECK(wiring.is_in_doubt());
   look(wiring, {speaker}, {speaker.theirs});
   CHECK(wiring.missing() == std::vector<Cable>{mixer});

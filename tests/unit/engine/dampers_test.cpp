@@ -108,7 +108,7 @@ TEST_CASE("a live pluck without a key is damped when the last key is released", 
     player.run(44100, events);
     return peak(std::span(player.y()).last(4000)) / peak(std::span(player.y()).first(9000));
   };
-  // The keys play nothing themselves, so only the live pluck is audible.
+  // The keys play nothing themselves, so only the pluck is audible.
   const Event swept = controller(0, 1, 1.0);
   const double rings = left({swept});
   CHECK(rings > 0.1);
@@ -159,8 +159,9 @@ TEST_CASE("a mono voice with a decay by key is struck anew, but only moves in le
   Player other(ringing_string(), preset);
   other.run(20000, {note_on(0, 64)});
   const auto late = [](const std::vector<double>& y) { return peak(std::span(y).subspan(30000)); };
-  // The voice is new: 10 000 frames after its stroke it is as loud as one that was struck alone.
-  // The first stroke lost 27 dB in 20 000 frames and is damped in 0.2 s, so 95 dB are gone.
+  // The voice is new: 10 000 frames after its stroke it is as loud as a voice that was struck only
+  // once. The first stroke lost 27 dB in 20 000 frames and is damped with a T60 of 0.2 s, so it is
+  // 95 dB lower.
   CHECK(late(played(false)) == Approx(peak(std::span(other.y()).subspan(10000))).epsilon(1e-3));
   CHECK(late(played(true)) < 0.1 * late(played(false)));
   CHECK(late(played(true)) > 0.001 * late(played(false)));
@@ -318,7 +319,8 @@ TEST_CASE("DC is blocked below 5 Hz, and nothing above 60 Hz changes", "[dampers
   double* const channel = step.data();
   blocker.process({&channel, 1}, step.size());
   CHECK(std::fabs(step.back()) < 1e-3);
-  // After the sound ends the filter's state decays too: 1e-7 takes 16 time constants of 0.5 ms.
+  // When the sound ends the filter's state decays too: it falls to 1e-7 in 16 time constants of 0.5
+  // ms.
   std::vector<double> nothing(480, 0.0);
   double* const after = nothing.data();
   blocker.process({&after, 1}, nothing.size());

@@ -304,7 +304,7 @@ TEST_CASE("A frozen part would have stayed inaudible", "[energy]") {
   INFO("asleep after " << slept << ", then " << show(loudest));
   CHECK(slept > 0);
   CHECK(loudest < 1e-6);
-  CHECK(loudest > 1e-9);  // so it could not have been frozen much earlier
+  CHECK(loudest > 1e-9);  // the part could not have been frozen much earlier
   CHECK(player.heap_calls == 0);
 }
 

@@ -66,7 +66,7 @@ TEST_CASE("an audio parameter acts sample by sample, through expressions too", "
 // --- pitch --------------------------------------------------------------------------------------
 
 TEST_CASE("a key has its frequency within two cents at any sample rate", "[engine]") {
-  // The lower the key, the more the ground's damper, whose strength is constant, detunes the mode.
+  // Low keys are detuned more, because the damper to the ground has a constant strength.
   for (const double rate_hz : {44100.0, 48000.0, 96000.0}) {
     for (const int key : {52, 57, 60, 69, 76, 81, 88, 93, 96}) {
       Player player(scenes::poly_triangle(), struck(1), {.rate_hz = rate_hz});
@@ -118,7 +118,8 @@ TEST_CASE("the bend range is two semitones in either direction", "[engine]") {
 
 TEST_CASE("voices add up, and a repeated key strikes its own voice again", "[engine]") {
   const std::string text = ringing_string();
-  // Uses the published scheme. Exact modes answer a blow in a voice's first sample slightly more.
+  // Uses the published scheme. Exact modes respond to a strike in a voice's first sample slightly
+  // more.
   const auto played = [&](int voices, const std::vector<Event>& events) {
     Player player(text, struck(voices), {.method = Method::direct});
     player.run(8000, events);
@@ -136,7 +137,8 @@ TEST_CASE("voices add up, and a repeated key strikes its own voice again", "[eng
   }
   INFO(show(chord_error.relative()) << " " << show(again_error.relative()));
   CHECK(chord_error.relative() < 1e-12);
-  CHECK(again_error.relative() < 1e-12);  // linear, so the ringing voice is kept and not restarted
+  // linear, so the ringing voice continues and does not restart
+  CHECK(again_error.relative() < 1e-12);
   CHECK(again.engine().meters().stolen == 0);
   CHECK(chord.engine().meters().stolen == 0);
   CHECK(again.engine().meters().voices == 1);
@@ -146,7 +148,7 @@ TEST_CASE("an excess note steals the quietest voice without a step", "[engine]")
   const std::string text = ringing_string();
   const Preset preset = struck(3);
   const std::vector<Event> three = {note_on(0, 60, 1.0), note_on(0, 64, 0.3), note_on(0, 67, 0.9)};
-  constexpr std::size_t stolen_at = 30000;  // by then all voices have their own levels
+  constexpr std::size_t stolen_at = 30000;  // by this time all voices have different levels
   constexpr std::size_t frames = 40000;
   std::vector<Event> events = three;
   events.push_back(note_on(stolen_at, 71, 1.0));
@@ -186,7 +188,7 @@ TEST_CASE("far more notes than voices are played in order", "[engine]") {
   CHECK(player.engine().meters().voices == 4);
   CHECK(player.engine().meters().stolen == 36);
   CHECK(player.engine().meters().resets == 0);
-  // A hundred keys at once: the newest sounds, and the others are stolen.
+  // A hundred keys at once: the newest voices sound, and the others are stolen.
   events.clear();
   for (int i = 0; i < 100; ++i) {
     events.push_back(note_on(0, 20 + i));

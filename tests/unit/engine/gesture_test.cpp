@@ -9,7 +9,7 @@ namespace {
 
 using namespace support;
 
-constexpr double smoothing_pole = 0.999;  // 1 - 44.1/44100
+constexpr double smoothing_pole = 0.999;  // pole of the smoothing, 1 - 44.1/44100
 
 // Output 1 is the driven input, output 2 the mass that it pulls.
 const std::string puppet =

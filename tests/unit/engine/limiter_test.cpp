@@ -75,7 +75,7 @@ TEST_CASE("the output never exceeds the ceiling", "[limiter]") {
     const auto out = limited(y);
     CHECK(peak(out) <= Limiter::ceiling);
     CHECK(std::all_of(out.begin(), out.end(), [](double s) { return std::isfinite(s); }));
-    // The limiter does not just turn everything down. Beyond 1e13 the gain has no digits left.
+    // The limiter must not attenuate everything. Beyond 1e13 the gain has no digits left.
     CHECK((peak(out) > 0.9 || peak(y) > 1e13));
   }
 }
@@ -127,7 +127,7 @@ TEST_CASE("the gain ramps down before the peak and recovers slowly", "[limiter]"
   for (std::size_t n = 10000 + 49; n < gain.size(); ++n) {
     REQUIRE(gain[n] >= gain[n - 1] - 1e-12);
   }
-  CHECK(gain.back() == 1.0);  // in the end it is a pure delay again
+  CHECK(gain.back() == 1.0);  // after the recovery it is a pure delay again
 }
 
 TEST_CASE("the reduction is exact at any depth", "[limiter]") {

@@ -69,7 +69,7 @@ class Storm {
 
 namespace {
 
-// Lifts everything as a player would: keys first, then pedals.
+// Releases everything as a player would: keys first, then pedals.
 void end_all(Player& player) {
   std::vector<Event> end;
   for (std::uint8_t channel = 0; channel < 16; ++channel) {
@@ -128,7 +128,7 @@ TEST_CASE("a million messages leave no hanging note", "[midi_storm]") {
                           [](double y) { return std::isfinite(y); }));
       if (++rounds % 5 == 0) {
         end_all(player);
-        // A voice that a controller has woken sleeps again.
+        // A voice that a controller woke sleeps again.
         for (int i = 0; i < 10 && player.engine().meters().stepped > 0; ++i) {
           player.run(10'000);
         }

@@ -120,7 +120,7 @@ TEMPLATE_TEST_CASE("channels receive the sum of all lanes times their gains", "[
       for (std::size_t lane = 0; lane < width; ++lane) {
         gain[lane] = lane % 3 == 1 ? T(0) : static_cast<T>(random.uniform(0.1, 1.0));
         for (std::size_t i = lane; i < y.size() && gain[lane] == T(0); i += width) {
-          y[i] = static_cast<T>(i % 2 == 0 ? no_number : infinity);  // not heard
+          y[i] = static_cast<T>(i % 2 == 0 ? no_number : infinity);  // ignored by the mix
         }
       }
       std::vector<std::vector<double>> channels(outputs, std::vector<double>(frames, 0.5));

@@ -351,7 +351,7 @@ TEST_CASE("a note with an ID is bent, pressed and ended alone, and follows its i
   CHECK(both({pressed(first, 100, 0.5)})[0] == Approx(0.5));
   CHECK(both({pressed(second, 100, 0.25), pressed(first, 100, 0.5)})[0] == Approx(0.75));
   CHECK(both({turned(second, 100, 74, 127)})[1] == Approx(1.0));
-  // The instrument's channel applies to all of them.
+  // The instrument's channel applies to all notes.
   CHECK(both({pressed(0, 100, 0.5)})[0] == Approx(1.0));
   CHECK(heard({on(first, note_on(0, 60)), turned(0, 3000, 7, 0)}) ==
         heard({note_on(0, 60), turned(0, 3000, 7, 0)}));

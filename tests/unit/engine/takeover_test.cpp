@@ -68,7 +68,7 @@ double difference(const std::string& text, const Preset& preset, int stiffness, 
   return worst / support::peak({stays.y().data() + 2000, 4000});
 }
 
-// Skips kernels that the part does not have, because they would be the direct one.
+// Skips kernels that cannot play the part, because the direct kernel would replace them.
 bool has_form(const std::string& text, Method method) {
   const Machine machine = make_machine(support::network_of(text), 48000.0, true);
   return make_plan(machine, {}, method).parts[0].method == method;
@@ -169,7 +169,7 @@ TEST_CASE("A large mesh sounds at once, and by modes as soon as they are found",
       }
     }
   };
-  play(50);  // it sounds already
+  play(50);  // it already sounds
   for (int patience = 0; patience < 5000 && relieved.meters().swaps < 2; ++patience) {
     play(20);
   }

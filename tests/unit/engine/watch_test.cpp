@@ -98,7 +98,7 @@ TEST_CASE("A large part's energy is added up in slices", "[watch]") {
     }
     CHECK(std::fabs(sum.value - whole) < 1e-12 * whole);
   }
-  // An engine does so while blocks are played. Without dampers there is no loss.
+  // An engine reads the energy while it plays blocks. Without dampers there is no loss.
   const std::string drum = scenes::square_mesh("m", 100, 100, "0.1", "0.") +
                            "@in1 frcInput @m_m20_30\n" + scenes::output(1, "m_m7_3");
   support::Bare<double> bare(support::program_of(drum));
@@ -273,7 +273,7 @@ TEST_CASE("A frozen part is taken over frozen and unfreezes the same way", "[wat
       Player stays(text, preset, {.method = Method::direct});
       Player leaves(text, preset, {.method = Method::direct});
       Player comes(text, preset, {.method = to});
-      comes.run(was_asleep ? 16384 : 100);  // frozen itself in both parts, or not
+      comes.run(was_asleep ? 16384 : 100);  // frozen in both of its parts, or in neither
       CHECK(comes.engine().meters().saved == (was_asleep ? 1.0 : 0.0));
       for (Player* player : {&stays, &leaves}) {
         player->run(quiet, events);

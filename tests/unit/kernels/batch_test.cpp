@@ -1,4 +1,4 @@
-// What is held in registers, and that every voice moves as it does alone.
+// The batch kernel: networks that fit into registers, and voices that move as they do alone.
 #include <limits>
 
 #include "core/kernels/batch/batch_form.h"
@@ -24,7 +24,7 @@ Program formed(const std::string& text) {
   return program;
 }
 
-// As many kernels as the voices need, each voice at its own pitch and with its own hands.
+// Enough kernels for the voices, each voice at its own pitch and with its own inputs.
 template <class T>
 class Choir {
  public:
@@ -44,10 +44,10 @@ class Choir {
   Kernel<T>& of(std::size_t voice) { return *kernels_[voice / width_]; }
   std::size_t lane(std::size_t voice) const { return voice % width_; }
 
-  // From now on one row is for all voices, that of the first.
+  // From now on, all voices use the coefficients of the first voice.
   void play_as_one() { is_common_ = true; }
 
-  // From now on nobody plays in the lanes of later voices.
+  // From now on, the lanes of later voices are unused.
   void play_only(std::size_t voices) { playing_ = voices; }
 
   void turn(std::size_t voice, const std::vector<double>& parameters, bool ramped) {
@@ -63,7 +63,7 @@ class Choir {
     }
   }
 
-  // hands(frame, voice, input); gives [voice][frame][output], one voice after the other.
+  // Plays hands(frame, voice, input). Returns [voice][frame][output], one voice after the other.
   template <class Hands>
   std::vector<double> play(std::size_t at, std::size_t frames, Hands&& hands) {
     std::vector<double> heard;
@@ -122,11 +122,11 @@ struct Contest {
   std::size_t voices = 1;
   std::size_t frames = 2000;
   double reach = 0.02;
-  bool turns = false;  // of the parameters, in one voice at a time
+  bool turns = false;  // changes the parameters, in one voice at a time
   Isa isa = best_isa();
 };
 
-// One Comparison for each voice, against the direct kernel in double.
+// Returns one Comparison for each voice, against the direct kernel in double.
 template <class T>
 std::vector<Comparison> contest(const Program& program, const Contest& options) {
   Program plain = program;
@@ -190,7 +190,7 @@ std::string example(const std::string& name) {
   return "";
 }
 
-// Masses of every kind, every pair of them held by one of the laws, or by none.
+// Returns masses of every kind. Each pair of them is linked by a random law or not at all.
 std::string random_body(std::uint64_t seed, std::size_t masses) {
   Random random(seed);
   std::string text = "@k param 0.02\n@z param 0.001\n@s0 ground 0.\n@s1 ground 0.01\n";
@@ -287,7 +287,8 @@ TEST_CASE("bodies of every size, of any laws", "[batch]") {
 }
 
 TEST_CASE("hard contacts are passive in every voice", "[batch]") {
-  // In registers and in memory; links of every scheme, some on the same mass, a hand that moves.
+  // Networks that fit into registers and networks that do not; links of every scheme, some on the
+  // same mass; a moving position input.
   for (const int masses : {1, 2, 3, 4, 7, 16}) {
     std::string text = "@w ground -0.01\n@g ground 0.\n@in1 posInput 0.\n@k param 0.1\n";
     const auto at = [&](int i) { return " @m" + std::to_string(i % masses) + " "; };

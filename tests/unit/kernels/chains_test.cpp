@@ -1,4 +1,4 @@
-// Which strings are found, and that they move as they are written.
+// The chains kernel: detection of strings, and their motion.
 #include <utility>
 
 #include "core/kernels/chains/chains_form.h"
@@ -14,7 +14,7 @@ using support::program_of;
 using support::Random;
 using support::show;
 
-// The same in the form of chains, of which there must be some.
+// Returns the Program in the form of chains. It must contain at least one chain.
 Program formed(const std::string& text) {
   Program program = program_of(text);
   auto form = chains_form(program);
@@ -37,15 +37,15 @@ void check_same(const Program& program, ComparisonOptions options, double most_r
   }
 }
 
-// In double and, where rounding is not blown up by a contact, in float.
+// Compares in double and, unless a contact amplifies rounding, in float.
 void check_both(const Program& program, const ComparisonOptions& options,
                 double most_relative = 1e-12) {
   check_same<double>(program, options, most_relative, 200.0);
   check_same<float>(program, options, 1e-4, 100.0);
 }
 
-// A force is a difference of positions and keeps less in float, and so does a faint sound behind
-// loud ones; in the direct form as well.
+// A force is a difference of positions, so float is less precise for it, as it is for quiet outputs
+// beside loud ones. This holds in the direct form too.
 void check_float(const Program& program, ComparisonOptions options) {
   Program plain = program;
   plain.form = Form();
@@ -62,7 +62,7 @@ void check_float(const Program& program, ComparisonOptions options) {
   }
 }
 
-// Lines in an order that is nobody's.
+// Returns the lines in random order.
 std::string shuffled(const std::string& text, std::uint64_t seed) {
   std::vector<std::string> lines;
   for (std::size_t at = 0; at < text.size();) {
@@ -81,7 +81,7 @@ std::string shuffled(const std::string& text, std::uint64_t seed) {
   return result;
 }
 
-// A row of `count` masses p_m0..., without what holds it.
+// A row of `count` masses p_m0..., without the links that hold its ends.
 std::string row(const std::string& p, int count, const std::string& mass,
                 const std::string& spring) {
   std::string text;
@@ -95,7 +95,7 @@ std::string row(const std::string& p, int count, const std::string& mass,
   return text;
 }
 
-// Springs of K2 between every two masses that have one between them.
+// Springs of K2 between masses that are two apart.
 std::string second_row(const std::string& p, int count, const std::string& k2) {
   std::string text;
   for (int i = 0; i + 2 < count; ++i) {
@@ -105,7 +105,8 @@ std::string second_row(const std::string& p, int count, const std::string& k2) {
   return text;
 }
 
-// As the macro stiffString lays its springs, of p_K, p_Z and p_K2, between grounds at 0.1 and -0.2.
+// The masses and springs of the macro stiffString, with p_K, p_Z and p_K2, between grounds at 0.1
+// and -0.2.
 std::string stiff_string(const std::string& p, int count) {
   const std::string first = scenes::at(p + "_m", 0);
   const std::string last = scenes::at(p + "_m", count - 1);
@@ -134,7 +135,7 @@ TEST_CASE("strings are found in any order of their lines", "[chains]") {
     CHECK(chain.left != chain.right);
     CHECK(form.loose.empty());
     CHECK(form.links.size() == 7);
-    // Every two neighbours hang together.
+    // All neighbours are linked.
     std::vector<std::uint64_t> springs;
     for (const Ends& ends : program.ends) {
       springs.push_back(std::uint64_t{std::min(ends.a, ends.b)} << 32 | std::max(ends.a, ends.b));
@@ -151,7 +152,7 @@ TEST_CASE("what is no string is left as it is", "[chains]") {
   CHECK(!chains_form(program_of(scenes::mesh_20x30())));
   CHECK(!chains_form(program_of(row("a", 7, "mass 1.", "0.1 0.01"))));
   CHECK(chains_form(program_of(row("a", 8, "mass 1.", "0.1 0.01"))));
-  // A branch belongs to nobody, another mass or spring ends a string.
+  // A branching mass belongs to no string, and a different mass or spring ends a string.
   const std::string star =
       row("a", 8, "mass 1.", "0.1 0.01") + row("b", 9, "mass 1.", "0.1 0.01") +
       row("c", 10, "mass 1.", "0.1 0.01") + "@o mass 1. 0. 0.\n" +
@@ -162,7 +163,7 @@ TEST_CASE("what is no string is left as it is", "[chains]") {
   CHECK(form->chains.size() == 3);
   CHECK(form->loose.size() == 1);
   CHECK(form->links.size() == 4);
-  // A ring is cut somewhere.
+  // A ring is cut at one of its masses.
   const auto ring = chains_form(
       program_of(row("a", 12, "mass 1.", "0.1 0.01") + "@s springDamper @a_m11 @a_m0 0.1 0.01\n"));
   REQUIRE(ring);
@@ -175,7 +176,7 @@ TEST_CASE("the instruments' strings move as they are written", "[chains]") {
     CAPTURE(turns);
     check_both(formed(scenes::resonator()), {.reach = 1.0, .turns = turns});
     check_both(formed(scenes::physical_lfo()), {.reach = 0.1, .turns = turns, .pitch = 1.3});
-    // Nearly constant bowing: in float a bow slips a sample earlier or later.
+    // Nearly constant bowing, because in float a bow slips a sample earlier or later.
     check_same<double>(formed(scenes::bowed_string()),
                        {.frames = 8000, .reach = 2e-3, .turns = turns}, 1e-9, 180.0);
     check_same<double>(formed(scenes::plucked_harmonics()),
@@ -222,14 +223,14 @@ TEST_CASE("stiff strings are found in any order of their lines", "[chains]") {
     check_same<double>(program, options, 1e-12, 200.0);
     check_float(program, options);
   }
-  // The same from the macro, whose ends are grounds, with places on it.
+  // The same string from the macro, whose ends are grounds, with places on it.
   const std::string macro =
       "@k param 0.4\n@k2 param 0.1\n@s stiffString 152 1. k k2 0.01 0. 0.\n@in1 frcInput [@s 0.3]\n"
       "@out1 posOutput [@s 0.81]\n";
   const Program program = formed(macro);
   CHECK(program.form.get<Chains>().chains.at(0).is_stiff);
   CHECK(program.form.get<Chains>().chains.at(0).count == 150);
-  CHECK(program.form.get<Chains>().links.size() <= 1);  // that of a ground to itself
+  CHECK(program.form.get<Chains>().links.size() <= 1);  // the link of a ground to itself
   check_both(program, {.turns = true});
 }
 
@@ -240,7 +241,8 @@ TEST_CASE("second springs that are not everywhere are left as they are", "[chain
   REQUIRE(at != std::string::npos);
   CHECK(chains_form(program_of(text))->chains.at(0).is_stiff);
   CHECK(chains_form(program_of(text))->links.empty());
-  // One that is there twice acts twice, one to what holds no end in the chain is a link.
+  // A spring that is written twice acts twice. A spring to a node that is not an end of the chain
+  // becomes a link.
   const std::string more = text +
                            "@x spring @a_m19 @a_m17 0.05\n@y spring @a_m3 @a_m30 0.05\n"
                            "@o mass 2. 0. 0.\n@z spring @a_m0 @o 0.05\n"
@@ -287,8 +289,9 @@ TEST_CASE("stiff strings of every length and every end fold into every pack", "[
 }
 
 TEST_CASE("everything beside a string acts on it", "[chains]") {
-  // Two strings of unlike masses; a loose mass and an oscillator between them, every smooth law,
-  // gravity, forces heard at a mass within, at an end, at a loose mass, at what holds a string.
+  // Two strings of different masses; a free mass and an oscillator between them; every smooth law;
+  // gravity; force outputs at a mass in the middle, at an end, at a free mass, and at a node that
+  // holds a string.
   const std::string text =
       row("a", 40, "mass 1.", "0.2 0.01") + row("b", 23, "osc 2. 0.001 0.002", "k 0.02") +
       "@k param 0.3\n@q param 0.02\n@g ground 0.1\n@h ground -0.1\n@in1 posInput 0.\n"
@@ -314,7 +317,8 @@ TEST_CASE("everything beside a string acts on it", "[chains]") {
   }
 }
 
-// One string between a hand and a ground stays in registers; neighbours share a pack or do not.
+// One string between a position input and a ground stays in registers. Neighbours are in the same
+// pack or in different packs.
 TEST_CASE("everything beside a short string acts on it", "[chains]") {
   for (const int count : {9, 31, 32, 77, 160}) {
     CAPTURE(count);

@@ -1,4 +1,4 @@
-// The force laws by hand, and the kernel against the textbook simulator.
+// The force laws against values computed by hand, and the kernel against the textbook simulator.
 #include <string_view>
 
 #include "core/laws/laws.h"
@@ -34,7 +34,7 @@ double contact(double d, double v, double k, double z, double t) {
   return laws::Contact<V>{lanes(k), lanes(z), lanes(t)}.force(lanes(d), lanes(v))[0];
 }
 
-// Everything that moves a scene, the same for every kernel: inputs()[i] at frame n.
+// The input signals of a scene, the same for every kernel: inputs()[i] at frame n.
 class Hands {
  public:
   Hands(const Network& network, const Example& example, std::uint64_t seed)
@@ -66,7 +66,7 @@ class Hands {
 }  // namespace
 
 TEST_CASE("the laws give what their formulas give by hand", "[direct]") {
-  // As printed by mi.lib itself; the force on a is -f.
+  // Values printed by mi.lib itself; the force on a is -f.
   const double deltas[] = {.005, .0099, .01, .05, .099, .1, -.005, -.05};
   const double on_a[] = {.0045, .00891, .009, .005, .0001, 0, -.0045, -.005};
   for (std::size_t i = 0; i < std::size(deltas); ++i) {
@@ -83,7 +83,7 @@ TEST_CASE("the laws give what their formulas give by hand", "[direct]") {
   CHECK(contact(-.5, 0, .1, 0, .5) == 0.0);
   CHECK(std::fabs(contact(-.4, 0, .1, 0, .5) - .01) < 1e-16);
   CHECK(std::fabs(contact(.2, 0, .1, 0, .5) - .07) < 1e-16);
-  // It may pull while it lasts, as published: a damper alone.
+  // A contact may attract while it separates, as published: the damper acts alone.
   CHECK(std::fabs(contact(.1, -.2, 0, .5, 0) + .1) < 1e-16);
   CHECK(contact(0.0, -.2, 0, .5, 0) == 0.0);
 
@@ -110,10 +110,10 @@ TEST_CASE("a bow grips hardest at a third of its speed, a smooth one at s/sqrt 8
     CHECK(std::fabs(smooth_bow(v, z, s)) <= .63 * z * top * (1 + 1e-15));
     CHECK(bow(-v, z, s) == -bow(v, z, s));
     CHECK(smooth_bow(-v, z, s) == -smooth_bow(v, z, s));
-    CHECK(v * bow(v, z, s) >= 0.0);  // friction never drives what it rubs
+    CHECK(v * bow(v, z, s) >= 0.0);  // friction never drives the mass that it acts on
     steepest = std::max(steepest, smooth_bow(v + 1e-9, z, s) - smooth_bow(v, z, s));
   }
-  // The slope at 0, which the stability bound counts with.
+  // The slope at 0, which the stability bound uses.
   CHECK(steepest / 1e-9 == Approx(1.0387 * z).epsilon(1e-4));
 }
 
@@ -200,8 +200,8 @@ TEST_CASE("so it is for every law and every start that the nine do not have", "[
 
 TEST_CASE("nonlinear springs, clipped contacts, gravity and force outputs equal the textbook's",
           "[direct]") {
-  // Both meanings of gravity, a limiter that clips in both directions, reactions at a hand and at a
-  // ground.
+  // Both meanings of gravity, a limiter that clips in both directions, and reaction forces at a
+  // position input and at a ground.
   for (const char* const text :
        {"@g ground 0.\n@in1 posInput 0.\n@in2 frcInput @a\n@a mass 1. 0.3 0.3\n"
         "@b massG 2. 0.00001 0. 0.\n@c osc 1. 0.01 0.001 0. 0. drawing 1. 2.\n"
@@ -220,7 +220,8 @@ TEST_CASE("nonlinear springs, clipped contacts, gravity and force outputs equal 
     const support::Motion hand(51, 0.5, 30.0);
     const support::Motion force(52, 20.0, 2000.0);
     std::vector<Comparison> channels(5);
-    for (std::size_t n = 0; n < 2000; ++n) {  // impacts are chaotic: later even doubles differ
+    // Impacts are chaotic: later even the results in double differ.
+    for (std::size_t n = 0; n < 2000; ++n) {
       const double rest = network.masses[1].position;
       const std::vector<double> inputs = {rest + 0.8 * hand(n), 0.02 * force(n)};
       const auto expected = oracle.simulator.step(inputs);
@@ -297,7 +298,7 @@ TEST_CASE("voices in neighbouring lanes do not hear each other", "[direct]") {
       REQUIRE(both.outputs(1) == expected[1]);
       differ |= expected[0] != expected[1];
     }
-    CHECK((differ || example.moving > 100));  // a long string's end may not have moved yet
+    CHECK((differ || example.moving > 100));  // The end of a long string may not have moved yet.
   }
 }
 
@@ -311,7 +312,7 @@ struct Golden {
   const char* printed;
 };
 
-// Half a unit of the last digit that was printed.
+// Returns half a unit of the last printed digit.
 double half_a_digit(std::string_view printed) {
   const std::size_t exponent = std::min(printed.find('e'), printed.size());
   const std::size_t point = std::min(printed.find('.'), exponent);
@@ -345,7 +346,7 @@ double impulse(std::size_t n) {
 
 }  // namespace
 
-// Whatever multiply-adds the other kernels' loops are made of.
+// Laws may use multiply-adds in the loops of other kernels.
 TEMPLATE_TEST_CASE("passive links have the same bits with every instruction set", "[direct]",
                    double, float) {
   for (const char* link : {"contact @in1 @m 0.9 0.01", "nlContact @in1 @m 0.1 20. 3. 0.01 0.005",
@@ -356,7 +357,7 @@ TEMPLATE_TEST_CASE("passive links have the same bits with every instruction set"
         "@g ground 0.\n@m mass 1.1 0. 0.\n@s springDamper @g @m 0.03 0.001\n@in1 posInput 0.\n@l " +
             std::string(link) + "\n@out1 posOutput @m\n",
         Passivity::always);
-    // In 16 voices, so that packs are as wide as they may be.
+    // Played with 16 voices, so that packs have their full width.
     const auto played = [&](Isa isa) {
       const auto kernel = make_kernel<TestType>(program, 16, isa);
       const std::size_t width = kernel->width();
@@ -450,14 +451,15 @@ TEST_CASE("golden values of appendix A, current laws", "[direct]") {
 
 namespace {
 
-// There x[-1] = -0.01 on one mass and everything else rests at 0; the first output is x[0].
+// Initial state: x[-1] = -0.01 at one mass, and all others at rest at 0. The first output is x[0].
 std::string kicked(std::string text, const std::string& mass) {
   const std::size_t start = text.find("@" + mass + " mass");
   const std::size_t end = text.find('\n', start);
   return text.replace(start, end - start, "@" + mass + " mass 1. -0.01 -0.02");
 }
 
-// A sample's place and value in the tables, to 1e-12 of the largest sample so far.
+// The index and the value of a sample in the tables, compared to 1e-12 of the largest sample so
+// far.
 struct Sample {
   std::size_t n;
   std::size_t channel;

@@ -1,4 +1,4 @@
-// The regular networks' kernel: what is found of their structure, and the same sound as without it.
+// The grid kernel: detection of regular structures, and equality with the direct kernel.
 #include <functional>
 #include <string>
 #include <vector>
@@ -28,7 +28,8 @@ const Grid& grid_of(const Program& program) {
   return program.form.get<Grid>();
 }
 
-// The text's lines with what they declare, in another order; ends exchanged here and there.
+// Returns the text's lines and declarations in another order, with the ends of some links
+// exchanged.
 std::string shuffled(const std::string& text, std::uint64_t seed) {
   std::vector<std::string> lines;
   for (std::size_t at = 0; at < text.size();) {
@@ -51,7 +52,7 @@ std::string shuffled(const std::string& text, std::uint64_t seed) {
   return masses + others;
 }
 
-// Every springDamper of a text with another law: keyword, and arguments after K and Z's place.
+// Returns the text with every springDamper replaced by another law with these arguments.
 std::string with_law(const std::string& text, const std::string& keyword,
                      const std::string& arguments) {
   std::string changed;
@@ -80,7 +81,7 @@ TEST_CASE("A square mesh is one segment with four neighbours", "[grid]") {
   CHECK(grid.rest_ends.empty());
   CHECK(grid.loose.empty());
   std::size_t masses = 0;
-  std::size_t ends = 0;  // of links, at masses
+  std::size_t ends = 0;  // number of link ends at masses
   for (std::size_t i = 0; i < grid.count; ++i) {
     masses += grid.moves[i];
     ends += grid.moves[i] * static_cast<std::size_t>(4 - grid.missing[i]);
@@ -97,7 +98,7 @@ TEST_CASE("Instruments are grids, and sound the same", "[grid]") {
     same_as_direct(formed(scenes::mesh_20x30()), options(0.1, 44100), 1e-12, 100.0);
   }
   SECTION("LargeTriangleMesh") {
-    // A pluck sticks and slips: nobody can follow it for long.
+    // A pluck sticks and slips, so the motion is chaotic and can be compared only for a short time.
     const Program program = formed(scenes::large_triangle_mesh());
     CHECK(grid_of(program).rest_ends.size() < 12);
     same_as_direct(program, options(0.06, 4410), 1e-12, 90.0);
@@ -120,7 +121,7 @@ TEST_CASE("A triangle mesh has six neighbours, and a large one a segment for eve
     longest = std::max(longest, segment.offsets.size());
   }
   CHECK(longest == 6);
-  CHECK(grid.count < 60 * 61);  // where rows of one length would need this many
+  CHECK(grid.count < 60 * 61);  // rows of equal length would need this many
   same_as_direct(program, {.frames = 4410}, 1e-12, 100.0);
 }
 
@@ -195,7 +196,8 @@ TEST_CASE("Grounds away from 0 are where they are needed", "[grid]") {
 }
 
 TEST_CASE("Networks that are regular but for a few things", "[grid]") {
-  // Masses that swing and fall, some links left out, some more between any two, a hammer.
+  // Masses that oscillate and fall, some links left out, some additional links between random
+  // masses, and a hammer.
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     Random random(seed);
     const auto rows = static_cast<int>(6 + random.below(15));
@@ -251,7 +253,7 @@ TEST_CASE("Strings of several kinds all move", "[grid]") {
 }
 
 TEST_CASE("What closes a ring is no offset of all of it", "[grid]") {
-  // Each mass would see two empty slots in its sum, and float would lose its place.
+  // Each mass would add two empty slots to its sum, and float would lose precision in its position.
   std::string text = "@k param 0.01\n@g ground 0.\n";
   for (int i = 0; i < 29; ++i) {
     text += scenes::at("m", i) + " mass 1. 0. 0.\n" + scenes::at("r", i) + " springDamper " +

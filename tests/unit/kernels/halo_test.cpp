@@ -1,4 +1,4 @@
-// Large networks in shards: what comes out is what the whole would have given.
+// Large networks in shards: the output equals that of the whole network.
 #include "app/realtime/denormals.h"
 #include "app/realtime/thread_pool.h"
 #include "core/kernels/chains/chains_form.h"
@@ -19,9 +19,9 @@ struct Cut {
   std::uint32_t frames = 64;
 };
 const Cut cuts[] = {{2, 64}, {3, 64}, {3, 7}};
-const Cut mesh_cuts[] = {{2, 10}, {3, 6}};  // each shard without a good part of it
+const Cut mesh_cuts[] = {{2, 10}, {3, 6}};  // Each shard lacks a large part of the network.
 
-// In shards, each in the form that `reform` gives it.
+// Returns the Program in shards, each in the form that `reform` chooses.
 template <class Reform>
 Program sharded(Program program, const Cut& cut, Executor& executor, Reform&& reform) {
   auto shards = std::make_shared<std::vector<Shard>>(make_shards(program, cut.shards, cut.frames));
@@ -44,8 +44,9 @@ std::optional<Direct> as_it_is(const Program&) {
   return Direct{};
 }
 
-// A chain of 2000 masses that ends on a moving hand; a finger, a bow and a force; heard at both
-// ends, beside both cuts of three shards, and as a force on the ground and on two masses.
+// A chain of 2000 masses that ends at a moving position input, with a finger, a bow and a force.
+// Outputs are at both ends, beside both cuts of three shards, and as forces on the ground and on
+// two masses.
 std::string chain_scene() {
   return scenes::string("s", 2000, "0.3", "0.002") +
          "@in1 posInput 0.\n@in2 posInput 0.\n@in3 frcInput @s_m668\n"
@@ -63,7 +64,7 @@ std::string heard_holds() {
   return "@out10 posOutput @in1\n@out11 posOutput @s_s0\n";
 }
 
-// 45 x 45 points on two corners, with a finger above the cut of two shards.
+// 45 x 45 points held at two corners, with a finger above the cut of two shards.
 std::string mesh_scene() {
   return scenes::square_mesh("p", 45, 45, "0.2", "0.003") +
          "@in1 frcInput @p_m10_11\n@in2 posInput 0.\n" + scenes::touch("finger", "p_m22_30", 2) +
@@ -71,7 +72,8 @@ std::string mesh_scene() {
          scenes::output(3, "p_m10_12");
 }
 
-// One Comparison for each output of the two, whose forms may differ, over 3000 samples.
+// Returns one Comparison for each output of two Programs, whose forms may differ, over 3000
+// samples.
 template <class T>
 std::vector<Comparison> compare(const Program& whole, const Program& cut, Isa isa, bool turns) {
   const DenormalsFlushed flushed;  // as in the executor's threads
@@ -109,7 +111,7 @@ std::vector<Comparison> compare(const Program& whole, const Program& cut, Isa is
   return outputs;
 }
 
-// The same bits in the direct form.
+// Checks for equal bits in the direct form.
 template <class T>
 void check_same(Program program, const Cut& cut, Executor& executor, Isa isa, bool turns) {
   INFO(cut.shards << " shards, " << cut.frames << " frames, " << isa_name(isa));
@@ -138,7 +140,7 @@ TEST_CASE("in the direct form shards compute the same bits", "[halo]") {
   check(mesh_scene(), mesh_cuts);
 }
 
-// The shards' kernels have been told nothing by then; masses 295 to 304 have copies, too.
+// The shards' kernels are not initialised yet; masses 295 to 304 have copies in both.
 TEST_CASE("a network in shards is struck before its first step", "[halo]") {
   ThreadPool executor(2);
   const Program program =
@@ -211,7 +213,7 @@ TEST_CASE("chains and grids in shards are held to the direct form", "[halo]") {
         INFO(show(output.relative()));
         CHECK(output.relative() < 1e-12);
       }
-      // Forces are small differences of what the form computes: held to the same form.
+      // Forces are small differences of positions, so they are compared with the same form.
       Program whole = program_of(text + forces);
       const Program shards = sharded(whole, cut, executor, reform);
       whole.form = *reform(whole);
@@ -250,7 +252,7 @@ TEST_CASE("a grid with a law on every link goes on in shards", "[halo]") {
   }
 }
 
-// With K = M a wave on a string moves as fast as anything can, a link in a sample.
+// At K = M a wave on a string has the highest possible speed, one link per sample.
 TEST_CASE("a wave goes over the cut as if it were not there", "[halo]") {
   ThreadPool executor(2);
   const Program program =
@@ -277,7 +279,7 @@ TEST_CASE("a wave goes over the cut as if it were not there", "[halo]") {
     CHECK(heard[2 * n + 1] == step(200));
   }
 
-  // With copies of what is near enough for 16 samples only, 64 are too many.
+  // The copies cover the neighbourhood of 16 samples, so 64 samples are too many.
   Program narrow = sharded(program, {2, 16}, executor, as_it_is);
   CHECK(played(narrow) == heard);
   Shards wider = narrow.form.get<Shards>();
@@ -286,7 +288,7 @@ TEST_CASE("a wave goes over the cut as if it were not there", "[halo]") {
   CHECK(played(narrow) != heard);
 }
 
-// 10 s of a string that nothing damps: 6900 exchanges.
+// 10 s of a string without damping: 6900 exchanges.
 TEST_CASE("shards do not drift", "[halo]") {
   ThreadPool executor(2);
   Program program = program_of(scenes::string("s", 2000, "0.3", "0") +
@@ -332,12 +334,12 @@ TEST_CASE("a network is shared out where that pays", "[halo]") {
   CHECK(planned(string, nullptr, {}) == 0);
   CHECK(planned("@s string 1000 1. 0.1 0.001 0. 1.\n@out1 posOutput [@s 0.3]\n", &executor, {}) ==
         0);
-  // Of 32 bytes a mass, in as many shards for each core, of at most 48 KiB.
+  // A mass takes 32 bytes. Each core gets the same number of shards, of at most 48 KiB each.
   const std::string long_string = "@s string 30000 1. 0.1 0.001 0. 1.\n@out1 posOutput [@s 0.3]\n";
   CHECK(planned(long_string, &executor, {}) == 20);
   CHECK(planned(long_string, nullptr, {}) == 20);
   CHECK(planned(long_string, &executor, Method::direct) == 2);
-  // A finger that may be put anywhere ties everything together.
+  // A finger that may move to any place depends on all masses.
   CHECK(planned(string + "@u param 0.5\n@in1 frcInput [@s u]\n", &executor, {}) == 0);
   CHECK(planned(string + "@in1 frcInput [@s 0.5]\n", &executor, {}) == 2);
 }
@@ -351,12 +353,12 @@ TEST_CASE("one core steps a network in shards where its caches do not hold it", 
   const Program& cut = planned.machine.parts[0];
   const auto* const shards = cut.form.get_if<Shards>();
   REQUIRE(shards != nullptr);
-  CHECK(shards->shards->size() == 196);  // of 32 bytes a mass, in shards of at most 48 KiB
+  CHECK(shards->shards->size() == 196);  // 32 bytes per mass, in shards of at most 48 KiB
   CHECK(describe(planned.parts).find("196 shards one after the other") != std::string::npos);
   const Planned grid = make_plan(machine, {.isa = best_isa()}, Method::grid);
   const auto* const wide = grid.machine.parts[0].form.get_if<Shards>();
   REQUIRE(wide != nullptr);
-  CHECK(wide->shards->size() == 10);  // of at most 1 MiB
+  CHECK(wide->shards->size() == 10);  // in shards of at most 1 MiB
   Program whole = machine.parts[0];
   whole.form = *chains_form(whole);
   Fighter<double> together(whole, 1.0, best_isa());

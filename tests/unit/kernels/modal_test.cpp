@@ -1,4 +1,4 @@
-// The modal kernel against the direct one, and the eigenvectors against what is known of them.
+// The modal kernel against the direct one, and the eigenvectors against known properties.
 #include "core/kernels/modal/modal_form.h"
 #include "tests/support/comparison.h"
 
@@ -55,8 +55,8 @@ TEST_CASE("The modes of a string are those of the textbook", "[modal]") {
 }
 
 TEST_CASE("Modes of a body cost nothing to each other", "[modal]") {
-  // Each ends by a coefficient of its own, which turns that mode alone: so many numbers are kept as
-  // there are modes, and not their square.
+  // Each mode's decay is a coefficient of its own that changes only this mode, so the form stores
+  // as many numbers as modes, not their square.
   std::string text = "@ring param 1.\n@b body 1. p\n";
   for (int i = 1; i <= 300; ++i) {
     text += "@m" + std::to_string(i) + " mode @b " + std::to_string(50 * i) + " [ring/" +
@@ -75,7 +75,8 @@ TEST_CASE("Modes of a body cost nothing to each other", "[modal]") {
 }
 
 TEST_CASE("Modes that no one hears are left out", "[modal]") {
-  // The middle of a string of 21 is a node of every even mode. Who strikes elsewhere moves these.
+  // The middle of a string of 21 is a node of every even mode. Strikes at other places excite these
+  // modes.
   const std::string string = scenes::string("s", 21, "0.1", "0.01");
   CHECK(modes_of(modal_program(string + "@in1 frcInput @s_m4\n" + scenes::output(1, "s_m10")))
             .modes == 11);
@@ -85,7 +86,7 @@ TEST_CASE("Modes that no one hears are left out", "[modal]") {
 
 TEST_CASE("What does not share its eigenvectors is refused", "[modal]") {
   CHECK(has_modes(scenes::mesh_20x30()));
-  // The triangle's corner is held by other shares of K and Z than its sides.
+  // The springs at the triangle's corner have another ratio of K and Z than those at its sides.
   CHECK_FALSE(has_modes(scenes::iplay_the_triangle()));
   const std::string two =
       "@K param 0.1\n@L param 0.1\n@g ground 0.\n@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n"
@@ -122,20 +123,21 @@ TEST_CASE("A hand on springs shakes the modes", "[modal]") {
 
 TEST_CASE("Masses, grounds, gravity and offsets are where they were", "[modal]") {
   const std::vector<std::string> scenes = {
-      // Different masses; a ground and a hand away from 0.
+      // Different masses; a ground and a position input away from 0.
       "@K param 0.1\n@Z param 0.01\n@g ground 1.\n@in1 posInput 1.5\n"
       "@a mass 1. 1.2 0.\n@b mass 2. 1. 0.\n@c mass 3. 1.1 0.\n"
       "@r springDamper @g @a K Z\n@s springDamper @a @b K Z\n@t springDamper @b @c K Z\n"
       "@u springDamper @c @in1 K Z\n@out1 posOutput @a\n@out2 posOutput @c\n@out3 posOutput @in1\n",
-      // Nothing holds it: it drifts.
+      // No link holds the network: it drifts.
       "@K param 0.1\n@Z param 0.01\n@a mass 1. 1. 0.9\n@b mass 1. 1. 1.\n@c mass 1. 1. 1.\n"
       "@s springDamper @a @b K Z\n@t springDamper @b @c K Z\n@in1 frcInput @b\n"
       "@out1 posOutput @a\n@out2 posOutput @c\n",
-      // One mass for all, turned; oscillators about 0, with damping by air, beside a ground at 1.
+      // One parameter for all masses, which changes; oscillators about 0, with damping by air,
+      // beside a ground at 1.
       "@K param 0.1\n@M param 1.5\n@A param 0.02\n@B param 0.003\n@g ground 1.\n"
       "@a osc M A B 0.1 0.\n@b osc M A B 0. 0.\n@in1 frcInput @b\n"
       "@s spring @a @b K\n@r spring @a @g A\n@u spring @b @g A\n@out1 posOutput @a\n",
-      // Gravity.
+      // With gravity.
       "@K param 0.1\n@Z param 0.01\n@G param 0.001\n@g ground 0.\n@in1 posInput 0.\n"
       "@a mass 1. G 0. 0.\n@b mass 1. G 0. 0.\n@s springDamper @a @b K Z\n"
       "@t springDamper @g @a K Z\n@u springDamper @b @in1 K Z\n@out1 posOutput @b\n"};
@@ -148,7 +150,7 @@ TEST_CASE("Masses, grounds, gravity and offsets are where they were", "[modal]")
   }
 }
 
-// Fingers that come down on a mesh, leave it and come back, and a soft pick.
+// Fingers that touch a mesh, leave it and return, and a soft pick.
 std::string touched_mesh() {
   return scenes::square_mesh("m", 8, 9, "0.1", "0.001") +
          "@in1 posInput 0.02\n@in2 posInput 0.05\n@in3 posInput 0.08\n"
@@ -171,8 +173,8 @@ TEST_CASE("Nonlinear links act on the modes as on the masses", "[modal]") {
 }
 
 TEST_CASE("A blow is felt far away within the block that it falls in", "[modal]") {
-  // A hard finger strikes one end of a light chain at rest; the other end hangs close to the ground
-  // and is thrown onto it at once.
+  // A hard finger strikes one end of a light chain at rest; the other end is close to the ground
+  // and hits it at once.
   const std::string text =
       "@K param 0.9\n@Z param 0.01\n@g ground 0.\n@floor ground -0.001\n@in1 posInput 0.05\n"
       "@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n@c mass 1. 0. 0.\n@h springDamper @g @a K Z\n"
@@ -207,7 +209,7 @@ TEST_CASE("A voice in its modes starts again as it started", "[modal]") {
   const std::vector<double> first = play();
   CHECK_FALSE(bare.kernel().is_near_start(0, 1e-9));
   bare.kernel().reset(0);
-  bare.feed(0, 0, 0.02);  // the hand back where it was
+  bare.feed(0, 0, 0.02);  // the position input returns to its place
   CHECK(bare.kernel().is_near_start(0, 1e-9));
   CHECK(play() == first);
 }

@@ -1,4 +1,4 @@
-// Modes that sleep: fewer are computed, and what is missing is never more than what is told.
+// Sleeping modes: the kernel computes fewer modes, and the error never exceeds the reported bound.
 #include <fstream>
 #include <sstream>
 
@@ -30,7 +30,7 @@ Program in_modes(const std::string& text, double silence_db) {
   return program;
 }
 
-// All awake; of those that a budget leaves in, or of all that there are.
+// All modes awake; either those that a budget leaves, or all that exist.
 Program wide_awake(Program program) {
   Modes modes = program.form.get<Modes>();
   modes.silence = 0.0;
@@ -38,7 +38,7 @@ Program wide_awake(Program program) {
   return program;
 }
 
-// A program with modes that sleep beside the same with all awake, driven alike.
+// A program with sleeping modes and the same program with all modes awake, with the same inputs.
 template <class T = double>
 class Pair {
  public:
@@ -48,7 +48,8 @@ class Pair {
         full_(wide_awake(program_), 1.0, isa),
         unreduced_(in_modes(text, -Budget::unlimited), 1.0, isa) {}
 
-  // At most nap_frames. Checks every output against what the sleepy one says of itself.
+  // Plays at most nap_frames. Checks every output against the error that the kernel with sleeping
+  // modes reports.
   void play(const std::vector<std::vector<double>>& inputs) {
     std::vector<double> owed;
     for (std::size_t o = 0; o < outputs(); ++o) {
@@ -89,8 +90,8 @@ class Pair {
   double peak() const { return peak_; }
   double worst() const { return worst_; }
   double most_owed() const { return most_owed_; }
-  double excess() const { return excess_; }    // of the error over the bound
-  double reduced() const { return reduced_; }  // the same beside all modes that there are
+  double excess() const { return excess_; }  // largest ratio of error to bound
+  double reduced() const { return reduced_; }  // the same, compared with all modes of the network
   const Program& program() const { return program_; }
   const Modes& form() const { return program_.form.get<Modes>(); }
 
@@ -113,7 +114,7 @@ class Pair {
   double excess_ = -1.0;
 };
 
-// How far all modes together may swing an output after a blow of 1, at most.
+// Returns an upper bound for the output amplitude of all modes together after a strike of 1.
 double reach_of_a_blow(const std::string& text) {
   const Modes modes = in_modes(text, -Budget::unlimited).form.get<Modes>();
   double most = 0.0;
@@ -170,7 +171,7 @@ TEST_CASE("A blow wakes all modes in its own sample", "[modes_asleep]") {
     if (wait > 10000) {
       CHECK(mesh.awake() < 12);
     }
-    // In the midst of a block.
+    // A strike in the middle of a block.
     mesh.play({{0.0}, {0.0}, {0.0}, {-0.7}, {0.0}});
     CHECK(mesh.awake() == mesh.modes());
   }
@@ -198,7 +199,7 @@ TEST_CASE("Parameters and pitch may be turned while modes sleep", "[modes_asleep
   CHECK(mesh.awake() < 20);
 }
 
-// A finger that comes down on a mesh now and then.
+// A finger that touches a mesh now and then.
 std::string touched_mesh() {
   return scenes::square_mesh("m", 8, 9, "0.1", "0.02") +
          "@in1 posInput 1.\n@t1 contact @m_m2_3 @in1 0.05 0.01 0.\n@in2 frcInput @m_m6_2\n" +
@@ -221,8 +222,8 @@ TEST_CASE("A touch wakes modes as a blow does", "[modes_asleep]") {
     INFO(mesh.mean_awake() << " of " << mesh.modes() << ", off by " << show(mesh.worst()) << " of "
                            << show(mesh.peak()));
     CHECK(mesh.mean_awake() < 0.5 * static_cast<double>(mesh.modes()));
-    // The finger feels what is missing, so that the bound is that of one free motion no more; it
-    // does not sound different for that.
+    // The finger responds to the error too, so the bound for free motion no longer holds. The sound
+    // does not differ audibly.
     CHECK(mesh.worst() < 1e-3 * mesh.peak());
     CHECK(mesh.worst() > 0.0);
   }

@@ -1,4 +1,4 @@
-// Modes of bodies whose damping does not share the eigenvectors of their stiffness.
+// Modes of bodies with non-proportional damping.
 #include <complex>
 
 #include "tests/support/modes.h"
@@ -24,7 +24,8 @@ Program in_crossed_modes(const std::string& text, Passivity passive = Passivity:
   return support::in_modes(text, passive, budget, true);
 }
 
-// The triangle on its ground: springs and dampers of other shares there than at its sides.
+// The triangle on its ground: the springs and dampers there have another ratio than those at its
+// sides.
 std::string triangle() {
   return "@g ground 0.\n@a mass 1. 0. -0.01\n@b mass 1. 0. 0.\n@c mass 1. 0. 0.\n"
          "@h springDamper @g @a 0.05 0.01\n@i springDamper @a @b 0.1 0.001\n"
@@ -62,7 +63,8 @@ TEST_CASE("The triangle's poles are those that are known", "[modes_crossed]") {
                    {4062.585604505056, 0.030338267322174}});
 }
 
-// Masses and springs of any numbers, some air, sometimes no ground for a damper.
+// Returns a body with random masses and springs and some air damping; some bodies have a damper
+// without a ground.
 std::string random_body(std::uint64_t seed, std::size_t most_masses) {
   Random random(seed);
   const std::size_t count = 2 + random.below(most_masses - 1);
@@ -160,7 +162,7 @@ Square times(const Square& a, const Square& b) {
   return c;
 }
 
-// e^a by its series, of a 1024th and squared ten times.
+// Computes e^a from the series for a/1024, squared ten times.
 Square exponential_of(Square a) {
   const std::size_t n = a.size();
   for (auto& row : a) {
@@ -169,7 +171,7 @@ Square exponential_of(Square a) {
     }
   }
   Square sum(n, std::vector<double>(n, 0.0));
-  // Less the identity, which would swallow small digits.
+  // Computed without the identity, next to which small digits would be lost.
   Square term = a;
   for (int k = 2; k < 14; ++k) {
     for (std::size_t i = 0; i < n; ++i) {
@@ -198,9 +200,11 @@ Square exponential_of(Square a) {
   return sum;
 }
 
-// (x, x', f) of a chain of masses: x'' = (f - K x - Z x')/M, the force on the first staying.
+// (x, x', f) of a chain of masses: x'' = (f - K x - Z x')/M. The force f on the first mass is
+// constant.
 struct Chain {
-  std::vector<double> mass, stiffness, damping;  // links: to the ground, then on to the next mass
+  // links: the first to the ground, the others to the next mass
+  std::vector<double> mass, stiffness, damping;
   std::size_t count() const { return mass.size(); }
   std::string text() const {
     std::string text = "@g ground 0.\n";
@@ -240,7 +244,7 @@ TEST_CASE("Exact crossed modes are the matrix exponential of the network", "[mod
     Chain chain;
     const std::size_t n = 2 + random.below(5);
     for (std::size_t i = 0; i < n; ++i) {
-      // As many digits as the text has.
+      // Rounded to the digits of the text.
       const auto number = [&](double low, double high) {
         return std::stod(show(random.uniform(low, high)));
       };
@@ -256,7 +260,7 @@ TEST_CASE("Exact crossed modes are the matrix exponential of the network", "[mod
     std::vector<double> state(2 * n + 1, 0.0);
     double worst = 0.0;
     double peak = 0.0;
-    // A force that is held from sample to sample, for 0.2 s.
+    // A force that is constant within each sample, for 0.2 s.
     for (int t = 0; t < 8820; ++t) {
       state[2 * n] = std::sin(0.001 * t * (1.0 + 0.001 * t)) + (t == 100 ? 5.0 : 0.0);
       std::vector<double> next(2 * n + 1, 0.0);
@@ -283,8 +287,8 @@ TEST_CASE("Passive links hold on to crossed modes as to masses", "[modes_crossed
     text += is_bowed ? "@b nlBow @in1 @m1 0.02 0.01\n" : "@p nlPluck @in1 @m1 0.02 0.05\n";
     const Program program = in_crossed_modes(text, Passivity::always);
     INFO(text);
-    // Links are solved together until no energy is made but by rounding: of a weak bow that says
-    // less than of the others.
+    // Links are solved together until rounding is the only energy gain. For a weak bow this is a
+    // weaker condition than for other links.
     check_same<double>(program, {.frames = 8820, .seed = seed}, is_bowed ? 1e-6 : 1e-9);
   }
 }
@@ -304,21 +308,21 @@ TEST_CASE("What is alike, overdamped or held by dampers alone has crossed modes 
           "[modes_crossed]") {
   const std::string hands = "@in1 frcInput @m_m1_1\n" + scenes::output(1, "m_m2_3");
   const std::vector<std::string> bodies = {
-      // By its symmetry many modes have the same pole.
+      // Because of its symmetry many modes have the same pole.
       scenes::square_mesh("m", 5, 5, "0.1", "0.001") +
           "@g ground 0.\n@c1 springDamper @g @m_m1_1 0. 0.05\n@c2 springDamper @g @m_m3_3 0. 0.05\n"
           "@c3 springDamper @g @m_m1_3 0. 0.05\n@c4 springDamper @g @m_m3_1 0. 0.05\n" +
           hands,
-      // Real poles, some below 0.
+      // Real poles, some of them negative.
       "@g ground 0.\n@a mass 1. 0.1 0.1\n@b mass 1.3 0. 0.\n@c mass 0.9 -0.2 -0.2\n"
       "@h springDamper @g @a 0.3 1.1\n@i springDamper @a @b 0.2 0.01\n"
       "@j springDamper @b @c 0.05 0.6\n@in1 frcInput @a\n@out1 posOutput @b\n",
-      // No spring holds it: it creeps until its force ends.
+      // No spring holds the network: it creeps until its force ends.
       "@g ground 0.\n@a mass 1. 0.1 0.1\n@b mass 1.3 0. 0.\n@c mass 0.9 -0.2 -0.2\n"
       "@h springDamper @g @a 0. 0.02\n@i springDamper @a @b 0.2 0.01\n"
       "@j springDamper @b @c 0.05 0.\n@in1 frcInput @a\n@out1 posOutput @b\n"};
   for (std::string text : bodies) {
-    // The mesh as it is written has parameters: here they are numbers.
+    // The published mesh has parameters; here they are replaced by numbers.
     for (const auto& [name, number] :
          {std::pair<std::string, std::string>{"m_M", "1."}, {"m_K", "0.1"}, {"m_Z", "0.001"}}) {
       const std::string line = "@" + name + " param";
@@ -335,8 +339,8 @@ TEST_CASE("What is alike, overdamped or held by dampers alone has crossed modes 
 }
 
 TEST_CASE("Crossed modes at hard contacts only lose energy", "[modes_crossed]") {
-  // 1/2 d (M - Z/2) d + 1/2 x K x+ and the mean of what contacts hold: not a sample in a hundred
-  // thousand brings it up.
+  // The energy 1/2 d (M - Z/2) d + 1/2 x K x+ plus the mean potential of the contacts: no sample of
+  // a hundred thousand increases it.
   const std::vector<double> mass = {1.0, 2.5, 0.8, 1.7};
   const std::vector<double> k = {0.3, 0.25, 0.1, 0.4};
   const std::vector<double> z = {2e-5, 0.0, 1e-5, 0.0};
@@ -401,10 +405,11 @@ TEST_CASE("Where crossed modes are of no use", "[modes_crossed]") {
     return modal_form(support::program_of(text), {}, {}, is_untuned).has_value();
   };
   CHECK(has(triangle()));
-  CHECK_FALSE(has(triangle(), false));                                      // a key would turn them
-  CHECK_FALSE(has("@K param 0.3\n" + triangle() + "@x spring @g @b K\n"));  // or a parameter
+  CHECK_FALSE(has(triangle(), false));  // a key would change them
+  // a parameter would change them, too
+  CHECK_FALSE(has("@K param 0.3\n" + triangle() + "@x spring @g @b K\n"));
   CHECK(has("@K param 0.3\n" + triangle() + "@x contact @g @b K 0.\n"));
-  // Two masses that drift apart from the ground for ever.
+  // Two masses that drift away from the ground for ever.
   CHECK_FALSE(
       has("@a mass 1. 0. 0.\n@b mass 2. 0. 0.\n@c mass 1. 0. 0.\n"
           "@i springDamper @a @b 0.1 0.001\n@j spring @b @c 0.1\n"

@@ -1,4 +1,4 @@
-// Modes that are true to the continuous network: against its solutions in closed form.
+// Exact modes against closed-form solutions of the continuous network.
 #include <complex>
 
 #include "core/compile/plan.h"
@@ -25,7 +25,7 @@ Program in_modes(const std::string& text, const Budget& budget) {
   return program;
 }
 
-// [output][frame], with nothing done to it.
+// Returns [output][frame] of free motion.
 template <class T>
 std::vector<std::vector<double>> let_ring(const Program& program, std::size_t frames,
                                           Isa isa = best_isa()) {
@@ -41,7 +41,7 @@ std::vector<std::vector<double>> let_ring(const Program& program, std::size_t fr
   return heard;
 }
 
-// Where q'' + Z q' + K q = 0 is at time n, that is at a at -1 and at b at 0.
+// Returns the solution of q'' + Z q' + K q = 0 at time n that is a at -1 and b at 0.
 double damped_cosine(double k, double z, double a, double b, double n) {
   const std::complex<double> root = std::sqrt(std::complex<double>(0.25 * z * z - k));
   const std::complex<double> one = std::exp(-0.5 * z + root);
@@ -52,11 +52,11 @@ double damped_cosine(double k, double z, double a, double b, double n) {
 }
 
 struct Pole {
-  double cents = 0.0;        // above the continuous oscillator
-  double t60_percent = 0.0;  // longer
+  double cents = 0.0;  // relative to the continuous oscillator
+  double t60_percent = 0.0;  // how much longer than that of the continuous oscillator, in percent
 };
 
-// From the recurrence x[n+1] = a x[n] - b x[n-1] that the samples obey.
+// Returns the pole, from the recurrence x[n+1] = a x[n] - b x[n-1] of the samples.
 Pole pole_of(const std::vector<double>& x, double k, double z) {
   double xx = 0.0, xy = 0.0, yy = 0.0, xt = 0.0, yt = 0.0;
   for (std::size_t n = 2; n + 1 < x.size(); ++n) {
@@ -83,14 +83,14 @@ TEST_CASE("One oscillator is in tune and dies when it should", "[modes_exact]") 
     CHECK(std::fabs(exact.cents) < 1e-6);
     CHECK(std::fabs(exact.t60_percent) < 1e-6);
   }
-  // As published it is neither.
+  // The published scheme has neither the pitch nor the decay.
   const std::string text = "@a osc 1. 0.1 0.001 1. 1.\n@in1 frcInput @a\n@out1 posOutput @a\n";
   const Pole plain = pole_of(let_ring<double>(in_modes(text, {}), 2000)[0], 0.1, 0.001);
   CHECK(std::fabs(plain.cents - 7.71720773873) < 1e-6);
   CHECK(plain.t60_percent < -0.04);
 }
 
-// Every mass of a fixed string starts somewhere, at some speed.
+// Every mass of a fixed string starts at a random position and speed.
 std::string thrown_string(int count, double k, double z) {
   std::string text = "@K param " + show(k) + "\n@Z param " + show(z) + "\n@l ground 0.\n";
   support::Random random(7);
@@ -107,7 +107,8 @@ std::string thrown_string(int count, double k, double z) {
   return text + scenes::output(1, "m3") + scenes::output(2, "m" + std::to_string(count - 2));
 }
 
-// The sum of its modes; sample 0 is the first that is heard, springs pull from then on.
+// Returns the sum of the string's modes. Sample 0 is the first output, and springs act from then
+// on.
 std::vector<double> ringing_string(const Program& program, std::uint32_t heard, double k, double z,
                                    std::size_t frames) {
   const std::uint32_t count = program.moving;
@@ -136,7 +137,7 @@ TEST_CASE("A string is the sum of its damped cosines", "[modes_exact]") {
     int count;
     double k, z;
   };
-  // The last creeps in its highest modes.
+  // The highest modes of the last string are overdamped.
   for (const auto& [count, k, z] :
        {Case{50, 0.1, 0.001}, Case{30, 1.5, 0.01}, Case{20, 0.02, 0.3}}) {
     const Program program = in_modes(thrown_string(count, k, z), physical);
@@ -182,11 +183,11 @@ TEST_CASE("A force that stays bends exact modes as far as springs allow", "[mode
   for (int i = 0; i < 100; ++i) {
     heard = fighter.play(std::vector<std::vector<double>>(60, {0.3}));
   }
-  // Two springs of three lengths side by side.
+  // Two chains of three springs each, in parallel.
   CHECK(std::fabs(heard.back() / (0.3 * 3.0 / (2.0 * 0.8)) - 1.0) < 1e-12);
 }
 
-// The same with a stiffness that moves, by the published scheme at many times the rate.
+// The same with a changing stiffness, by the published scheme at many times the rate.
 std::vector<double> finely(double k, double z, double to, std::size_t from, std::size_t ramp,
                            std::size_t frames) {
   constexpr int fine = 256;
@@ -200,7 +201,8 @@ std::vector<double> finely(double k, double z, double to, std::size_t from, std:
       const double t = static_cast<double>(n) + (i + 0.5) / fine;
       const double done = std::clamp((t - static_cast<double>(from)) / double(ramp), 0.0, 1.0);
       const double stiffness = k + done * (to - k);
-      // Half a step of speed, a whole one of place, half of speed.
+      // Half a step of velocity, a whole step of position, half a step of velocity
+      // (Störmer-Verlet).
       v -= 0.5 / fine * (stiffness * x + z * v);
       x += v / fine;
       v = (v - 0.5 / fine * stiffness * x) / (1.0 + 0.5 / fine * z);
@@ -227,7 +229,7 @@ TEST_CASE("Exact modes follow a stiffness that is turned", "[modes_exact]") {
     }
     return heard;
   };
-  // The first sample that hears of it is pulled from the place before.
+  // The first sample with the new stiffness uses the previous position.
   const auto wanted = finely(0.1, 0.001, 0.14, from - 1, 128, frames + 1);
   const auto snr = [&](const std::vector<double>& heard) {
     Comparison comparison;
@@ -264,8 +266,8 @@ TEST_CASE("How far off the published scheme is", "[modes_exact]") {
                                                 scenes::output(1, "s_m9"));
     return Judge(program, {{program.parameters, 1.0}}, patient_modes).of(Form());
   };
-  // The highest mode of such a string is 31.7 cents and 0.2 % off: its K is 0.4 cos^2(pi/102), and
-  // 2 asin(sqrt(K)/2) beside sqrt(K - Z^2/4).
+  // The highest mode of such a string is off by 31.7 cents and 0.2 %: its K is 0.4 cos^2(pi/102),
+  // so its frequency is 2 asin(sqrt(K)/2) instead of sqrt(K - Z^2/4).
   CHECK(of("0.1", "0.001").cents == Approx(31.7).epsilon(0.01));
   CHECK(of("0.1", "0.001").t60_percent > 0.19);
   CHECK(of("0.1", "0.001").t60_percent < 0.21);

@@ -1,5 +1,5 @@
-// Modes that are left out: what is missing is never more than what is told, and links that hold on
-// to what is left feel nearly what they felt.
+// Omitted modes: the error never exceeds the reported bound, and links on the remaining modes
+// respond nearly as before.
 #include "core/kernels/modal/modal.h"
 #include "core/kernels/modal/modal_form.h"
 #include "tests/support/comparison.h"
@@ -24,8 +24,8 @@ double value_of(const Program& program, std::uint32_t c) {
   return coefficient_value(program, program.coefficients[c], program.parameters, 1.0);
 }
 
-// How far all modes of a whole form together may swing, per output: by a blow through each push,
-// and from the start.
+// Upper bounds of the output amplitudes of all modes of a complete form, for a strike through each
+// push and for the initial state.
 struct Swings {
   std::vector<std::vector<double>> blow;  // [push][output]
   std::vector<double> start;              // [output]
@@ -45,12 +45,12 @@ Swings swings_of(const Program& program, const Modes& modes) {
     for (const ModalShare& share : modes.damping) {
       z += w * value_of(program, share.coefficient) * factor_at(share, i);
     }
-    // The angle of the poles a/2 +- i s.
+    // Angle of the poles a/2 +- i s.
     const double s = std::sqrt(1.0 - z - 0.25 * (2.0 - k - z) * (2.0 - k - z));
     if (!std::isfinite(s) || !(s > 0.0)) {
       continue;
     }
-    // q[n] = q C[n] + (q - d) ..., its amplitude by the two samples.
+    // Amplitude of the mode, from its position in two successive samples.
     const double before = modes.q[i] - modes.d[i];
     const double along =
         (std::sqrt(1.0 - z) * before - modes.q[i] * (2.0 - k - z) / (2.0 * std::sqrt(1.0 - z))) /
@@ -71,7 +71,7 @@ Swings swings_of(const Program& program, const Modes& modes) {
   return swings;
 }
 
-// A little of everything at random, and then nothing.
+// A few random strikes of every kind, followed by silence.
 std::vector<std::vector<double>> blows(const Program& program, Random& random, std::size_t frames) {
   std::vector<double> rest;
   for (const InputSlot& input : program.inputs) {
@@ -86,7 +86,7 @@ std::vector<std::vector<double>> blows(const Program& program, Random& random, s
   return inputs;
 }
 
-// The sizes of all that acts through each push. Hands rest.
+// Returns the sums of absolute inputs through each push. Position inputs rest.
 std::vector<double> sums_of(const Program& program, const Modes& modes,
                             const std::vector<std::vector<double>>& inputs) {
   std::vector<double> sums;
@@ -106,7 +106,7 @@ struct Tally {
   std::size_t networks = 0;
   std::size_t shortened = 0;
   std::size_t slept = 0;
-  double tightest = 0.0;  // largest error per bound
+  double tightest = 0.0;  // largest ratio of error to bound
 };
 
 void check_network(const Program& program, double silence_db, Random& random, Tally& tally) {
@@ -117,7 +117,7 @@ void check_network(const Program& program, double silence_db, Random& random, Ta
   }
   if (std::any_of(program.outputs.begin(), program.outputs.end(),
                   [](const OutputSlot& output) { return output.is_force; })) {
-    // There is no bound for what forces swing by.
+    // Force outputs have no such bound.
     CHECK(some->modes == full->modes);
     CHECK(some->silence == 0.0);
     return;
@@ -140,7 +140,7 @@ void check_network(const Program& program, double silence_db, Random& random, Ta
   const auto& kernel = dynamic_cast<const ModalKernel<double>&>(other.kernel());
   std::vector<double> asleep(full->outputs.size(), 0.0);
   bool has_slept = false;
-  // No block is longer than a nap, so that the most is owed at its begin or its end.
+  // No block is longer than a nap, so the error is largest at the begin or the end of a block.
   for (std::size_t at = 0; at < frames; at += 30) {
     const std::span block = std::span(inputs).subspan(at, 30);
     for (std::size_t o = 0; o < asleep.size(); ++o) {
@@ -191,7 +191,7 @@ TEST_CASE("What is left out of a random network is never more than told", "[mode
   CHECK(tally.tightest > 0.1);
 }
 
-// A string plucked over a wall, of which only the lowest modes are left.
+// Returns a string plucked over a wall, reduced to its lowest modes.
 std::string string_over_a_wall(double stiffness) {
   constexpr int count = 50;
   std::string text = "@K param 0.1\n@Z param 0.0005\n@l ground 0.\n@wall ground -0.02\n";
@@ -209,7 +209,7 @@ std::string string_over_a_wall(double stiffness) {
          scenes::output(1, "m37");
 }
 
-// The first `count` in pitch, with or without what the others would give way.
+// Returns the lowest `count` modes, with or without the static compliance of the others.
 Program shortened(const Program& program, std::uint32_t count, bool gives) {
   const Modes full = program.form.get<Modes>();
   const std::vector<double>& factor = full.stiffness[0].factor;

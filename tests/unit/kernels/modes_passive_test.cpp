@@ -1,4 +1,4 @@
-// Passive links on modes: as on masses, and without making energy.
+// Passive links on modes: the same motion as on masses, and no energy gain.
 #include "tests/support/heap.h"
 #include "tests/support/modes.h"
 #include "tests/support/thorough.h"
@@ -15,7 +15,7 @@ using support::show;
 
 constexpr double pi = std::numbers::pi;
 
-// Fingers that come down on a mesh, leave it and come back, and a soft pick.
+// Fingers that touch a mesh, leave it and return, and a soft pick.
 std::string touched_mesh() {
   return scenes::square_mesh("m", 8, 9, "0.1", "0.001") +
          "@in1 posInput 0.02\n@in2 posInput 0.05\n@in3 posInput 0.08\n"
@@ -38,7 +38,7 @@ TEST_CASE("Passive links act on the modes as on the masses", "[modes_passive]") 
   }
 }
 
-// Fingers of two places each on a mesh, dampers alone or as hard as asked, that stay inside for
+// Fingers of two places each on a mesh, as pure dampers or with the given stiffness, in contact for
 // most of the time.
 std::string held_mesh(double k, double z) {
   std::string text = scenes::square_mesh("m", 8, 9, "0.1", "0.001") +
@@ -65,7 +65,7 @@ TEST_CASE("Contacts that stay inside act on the modes as on the masses", "[modes
   }
 }
 
-// Some links of each law on one string, some on one mass, some between two.
+// A string with links of each law, some on one mass, some between two masses.
 std::string busy_string() {
   return scenes::string("s", 30, "0.1", "0.005") +
          "@in1 posInput 0.\n@in2 posInput 0.1\n@in3 frcInput @s_m9\n@floor ground -0.05\n"
@@ -85,7 +85,7 @@ TEST_CASE("Passive links of all laws share a body", "[modes_passive]") {
   }
 }
 
-// A string of equal masses without losses, thrown at hard contacts, with a spring that stiffens.
+// A lossless string of equal masses that hits hard contacts, with a stiffening spring.
 struct Lossless {
   static constexpr int count = 12;
   static constexpr double k = 0.1;
@@ -109,7 +109,7 @@ struct Lossless {
     }
     return text;
   }
-  // What links hold that are not linear.
+  // Returns the potential of the nonlinear links.
   static double potential(const std::vector<double>& x) {
     double sum = 0.25 * cubic * std::pow(x[4] - x[9], 4);
     for (const std::size_t i : {2u, 7u}) {
@@ -118,8 +118,8 @@ struct Lossless {
     }
     return sum;
   }
-  // Of the modes, by the sines that they are: 1/2 d^2 / gain + 1/2 K q q+ each, where the scheme
-  // has lK = gain K. Of exact ones lK is 2 - 2 cos sqrt(K).
+  // Returns the energy of the modes, whose shapes are sines: 1/2 d^2 / gain + 1/2 K q q+ each,
+  // where the scheme has lK = gain K. Exact modes have lK = 2 - 2 cos sqrt(K).
   static double energy(const std::vector<double>& now, const std::vector<double>& next,
                        bool is_exact) {
     double sum = 0.5 * (potential(now) + potential(next));
@@ -257,9 +257,9 @@ TEST_CASE("What is too much to be solved together is left to the masses", "[mode
 }
 
 TEST_CASE("Modes that are left out give way to passive links as well", "[modes_passive]") {
-  // A finger lies hard on a row of masses that the air holds: each mode takes part in where it
-  // rests. How hard it is pressed back is told by how far the mass is from where it was, in shares
-  // of how far a small force brings it.
+  // A finger lies hard on a row of masses that only air damping holds, so each mode contributes to
+  // its rest position. The reaction force is measured by the displacement of the mass, relative to
+  // the displacement by a small force.
   std::string text = "@in1 posInput 0.\n@in2 frcInput @m17\n";
   for (int i = 0; i < 40; ++i) {
     text += scenes::at("m", i) + " osc 1. 0.2 0.01 0. 0.\n";

@@ -1,4 +1,4 @@
-// Places on macros in the modes: sums of masses, as the direct kernel has them.
+// Places on macros with modes: sums of masses, as in the direct kernel.
 #include "tests/support/modes.h"
 
 namespace ressort::modes_places_test {
@@ -38,7 +38,7 @@ TEST_CASE("A place's modes are sums of those of the masses around it", "[modes_p
 }
 
 TEST_CASE("A mesh is held and struck at places", "[modes_places]") {
-  // Springs at places are springs between sums of masses: K and Z in the same shares everywhere.
+  // Springs at places are springs between sums of masses. K and Z have the same ratio everywhere.
   const std::string mesh =
       "@k param 0.1\n@z param 0.004\n@s cornerMesh 6 9 1. k z 0. 0.\n@g ground 0.02\n"
       "@in1 frcInput [@s 0.31 0.6]\n@in2 posInput 0.\n"
@@ -56,8 +56,8 @@ TEST_CASE("A mesh is held and struck at places", "[modes_places]") {
     const ComparisonOptions options{.frames = 8820, .turns = turns};
     check_same<double>(in_modes(plucked + heard, Passivity::never), options, 1e-9);
     check_same<double>(in_modes(touched + heard, Passivity::always), options, 1e-9);
-    // In substeps the direct kernel takes a place's speed for how far it has gone, modes for that
-    // of its masses, as everywhere else.
+    // In substeps the direct kernel takes the displacement of a place for its speed, and the modal
+    // kernel the speed of its masses.
     check_same<double>(in_modes(plucked + heard, Passivity::always), options, 1e-5);
   }
 }
@@ -94,7 +94,8 @@ TEST_CASE("Forces at masses, places, grounds and hands are felt through the mode
 }
 
 TEST_CASE("A force that rests is felt as it is pushed back", "[modes_places]") {
-  // Hung on one spring, with exact modes: what pulls at the mass is what the ground feels.
+  // A mass on one spring, with exact modes: the spring's force on the mass is its reaction force on
+  // the ground.
   const std::string text =
       "@g ground 0.\n@m mass 1. 0. 0.\n@s springDamper @g @m 0.8 0.4\n@in1 frcInput @m\n"
       "@out1 frcOutput @g\n@out2 frcOutput @m\n";

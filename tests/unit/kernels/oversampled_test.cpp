@@ -1,4 +1,4 @@
-// Several steps a sample: the same as the network at so many times the rate, every so many samples.
+// Oversampling: several steps per sample equal the network at a multiple of the rate, decimated.
 #include "core/kernels/oversampled/oversampled_form.h"
 #include "tests/support/harness.h"
 
@@ -13,7 +13,7 @@ using support::show;
 
 constexpr std::uint32_t times = 4;
 
-// Springs, gravity, a hand, a contact that it makes, a force, and one that is heard.
+// Springs, gravity, a position input that makes a contact, a force input, and a force output.
 std::string touched() {
   return scenes::string("s", 9, "0.1", "0.002") +
          "@h mass 1.5 0.001 0.\n@k springDamper @h @s_m4 0.05 0.001\n"
@@ -52,7 +52,7 @@ TEST_CASE("several steps a sample are as many samples at a finer rate", "[oversa
     INFO("off by " << show(worst) << " of " << show(peak));
     CHECK(has_touched);
     CHECK(peak > 0.01);
-    // The hand's way is added up in another order.
+    // The displacement of the input is summed in another order.
     CHECK(worst < 1e-11 * peak);
   }
 }
@@ -67,7 +67,7 @@ TEST_CASE("coefficients on their way and states go through to the finer steps", 
   for (std::size_t n = 0; n < 100; ++n) {
     one.step({0.3, n == 0 ? 0.1 : 0.0});
   }
-  // What was saved is where another goes on, but for what links felt in that sample.
+  // A kernel continues from a saved state, except for the link forces of that sample.
   REQUIRE(one.kernel().save(0, x.data(), v.data()));
   other.kernel().set_state(0, x.data(), v.data());
   std::vector<double> y(x.size());
@@ -75,7 +75,7 @@ TEST_CASE("coefficients on their way and states go through to the finer steps", 
   REQUIRE(other.kernel().save(0, y.data(), w.data()));
   CHECK(x == y);
   CHECK(v == w);
-  // A spring that is turned stiffer within 64 samples is where it was turned to.
+  // A spring that becomes stiffer reaches its new value within 64 samples.
   std::vector<double> turned = program.parameters;
   turned[1] *= 1.5;
   one.set_coefficients(0, turned, 1.0, true);

@@ -30,7 +30,7 @@ void each_law(Use&& use) {
   }
 }
 
-// Returns random arguments within musical ranges.
+// Returns random arguments within the usual ranges.
 LawNumbers any_arguments(const LawFacts& law, Random& random) {
   LawNumbers values{};
   for (std::size_t i = 0; i < law.count; ++i) {
@@ -117,7 +117,7 @@ TEST_CASE("the slopes of every law reach their bounds and do not exceed them", "
       for (int k = 0; k < 500; ++k) {
         const double d = random.uniform(-1.0, 1.0);
         const double v = random.uniform(-1.0, 1.0);
-        const double out = d < 0.0 ? -h : h;  // away from 0
+        const double out = d < 0.0 ? -h : h;  // one step further from 0
         const double by_d = (law.force(d, 0.0) - law.force(d - out, 0.0)) / out;
         const double by_v = (law.force(d - out, v + h) - law.force(d - out, v)) / h;
         const double at_0 = (law.force(d - out, h) - law.force(d - out, 0.0)) / h;
@@ -130,8 +130,8 @@ TEST_CASE("the slopes of every law reach their bounds and do not exceed them", "
           FAIL("steeper than it says");
         }
       }
-      // A clipped law is steepest at one point, which no draw meets; and of a law with several
-      // shapes only the steepest reaches the bound.
+      // A clipped law is steepest at a single point, which random points miss. For a law with
+      // several shapes only the steepest shape reaches the bound.
       if (!type.facts.has(Role::limit) && !type.facts.has(Role::shape)) {
         CHECK(stiffest >= 0.8 * most.stiffness);
         CHECK(most_damped >= 0.99 * most.damping - rounding);
@@ -239,8 +239,8 @@ TEST_CASE("the ends of an odd law may be exchanged", "[laws]") {
 }
 
 TEST_CASE("a discrete gradient does not create energy", "[laws]") {
-  // Force times way is what the potential gains, to rounding; a damper only takes. Where all that
-  // moves is damped, what is lost is no less.
+  // Force times displacement equals the change of the potential, to rounding; a damper only removes
+  // energy. Where every moving mass is damped, at least this loss occurs.
   each_law([&](auto type, Random& random) {
     const LawFacts& facts = type.facts;
     for (int i = 0; i < draws; ++i) {
@@ -260,7 +260,8 @@ TEST_CASE("a discrete gradient does not create energy", "[laws]") {
       double work = f * way;
       double gained = 2.0 * (held(law, after, link.now) - held(law, link.now, link.before()));
       if constexpr (type.facts.contains_spring && type.facts.is_curved) {
-        work -= (law.k * link.now + law.z * link.speed) * way;  // this part is as published
+        // this part uses the published scheme
+        work -= (law.k * link.now + law.z * link.speed) * way;
       }
       CAPTURE(link.now, link.speed, link.free, link.gamma, f);
       CHECK(work >= gained - 1e-9);

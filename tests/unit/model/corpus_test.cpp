@@ -25,7 +25,7 @@ const std::filesystem::path folder = RESSORT_SOURCE "/tests/corpus";
 
 struct Model {
   const char* name;
-  std::size_t masses;  // without points
+  std::size_t masses;  // excluding points
   std::size_t links;
   std::size_t macros;
   std::size_t points;

@@ -111,7 +111,7 @@ TEST_CASE("expressions that are too deep or too long are rejected", "[expression
   // 1+(1+(1+ ... puts one more number on the stack at each level.
   CHECK(value(repeated("1+(", 31) + "1" + repeated(")", 31)) == 32.0);
   CHECK_FALSE(parse_expression(repeated("1+(", 32) + "1" + repeated(")", 32), names));
-  // 256 steps: 128 numbers and 127 operators fit, 129 and 128 do not.
+  // An expression has at most 256 steps: 128 numbers with 127 operators fit, 129 with 128 do not.
   CHECK(value("1" + repeated("+1", 127)) == 128.0);
   CHECK_FALSE(parse_expression("1" + repeated("+1", 128), names));
   CHECK_FALSE(parse_expression(repeated("-", 100000), names));

@@ -27,8 +27,8 @@ double link_value(const Network& network, std::size_t slot) {
   return value(network, network.links.back().arguments[slot]);
 }
 
-// One line of appendix A: the response at `out` to a unit force at sample 0 at `in`. There a
-// force acts one sample later than here, so sample n there is n - 1 here.
+// One line of appendix A: the response at `out` to a unit force at sample 0 at `in`. In the
+// appendix a force acts one sample later than here, so its sample n is n - 1 here.
 struct Golden {
   const char* name;
   const char* text;
@@ -312,7 +312,7 @@ TEST_CASE("a place beyond the end of a macro is clamped, with a warning", "[macr
 }
 
 TEST_CASE("places, grounds and position inputs start at rest", "[macro]") {
-  // Dampers only: nothing has moved before the first sample, so there is no force.
+  // Dampers only: every node is at rest before the first sample, so there is no force.
   support::Bare<double> bare(
       make_program(network_of("@in1 posInput 3\n@g ground -2\n@s chain 5 1 0.1 0 [0 0 1.5] 0\n"
                               "@q closedMesh 4 4 1 0.1 0 [0 0 0.5] [0 0 0]\n"

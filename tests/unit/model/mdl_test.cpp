@@ -334,8 +334,8 @@ TEST_CASE("every error has a line, a column and the expected text", "[mdl]") {
 }
 
 TEST_CASE("reading stops after a hundred errors", "[mdl]") {
-  // Each kind is the worst case for another part of the reader. A quadratic algorithm would exceed
-  // the
+  // Each kind of text is the worst case for another part of the reader. A quadratic algorithm would
+  // exceed the time limit.
   std::string unknown_words;
   std::string unknown_masses;
   std::string duplicates;

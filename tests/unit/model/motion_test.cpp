@@ -1,4 +1,5 @@
-// The meaning of the third state argument: how it is decided, reported and doubted.
+// The meaning of the third state argument: how the reader decides it, reports it and warns about
+// doubt.
 #include <string>
 
 #include "core/model/language/mdl.h"

@@ -424,7 +424,7 @@ TEST_CASE("a model that no key can play suggests a line to add", "[preset]") {
         "keys strike it");
   CHECK(told("@s mesh 4 4 1. 0.1 0. 0. 0.\n").find("'@in1 frcInput [@s 0.3 0.4]'") !=
         std::string::npos);
-  CHECK(told("@g ground 0.\n@in1 frcInput @g\n") == "");  // nothing moves
+  CHECK(told("@g ground 0.\n@in1 frcInput @g\n") == "");  // no mass moves
   // The suggestion skips grounds.
   const Preset second =
       default_preset(network_of(triangle + "@in1 frcInput @g\n@in2 frcInput @m0\n"), false);

@@ -152,7 +152,7 @@ TEST_CASE("omitted arguments are 0", "[rules]") {
 // --- R5 ----------------------------------------------------------------------------------------
 
 TEST_CASE("a form of one dialect determines the meaning of the third argument", "[rules]") {
-  // After a mass that would otherwise be read in the other meaning.
+  // The form is after a mass that would otherwise be read in the other meaning.
   const std::string as_delayed = two_masses + "@c mass 1 0 1\n@k param 1\n";
   const std::string as_velocity = two_masses + "@c mass 1 1 0\n@k param 1\n";
   REQUIRE(network_of(as_delayed).third == delayed);

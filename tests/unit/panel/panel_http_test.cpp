@@ -378,7 +378,7 @@ TEST_CASE("a port in use is an error, and streams end with the panel", "[panel_h
   const int viewer = stage->connect();
   Stage::send(viewer, stage->get("/motion?hz=1"));
   Stage::receive(viewer, 300);
-  const int idler = stage->connect();  // Sends nothing.
+  const int idler = stage->connect();  // A client that sends no request.
   Stage::send(idler, "GET / HT");
   auto ended = std::async(std::launch::async, [&] { stage.reset(); });
   CHECK(ended.wait_for(std::chrono::seconds(60)) == std::future_status::ready);

@@ -29,7 +29,8 @@ TEST_CASE("a slot hands over 100,000 objects without loss or duplicates", "[lock
   constexpr int count = 100000;
   Slot<Counted> slot;
   std::atomic<bool> all_offered{false};
-  std::vector<int> fates(count, 0);  // how often each came back, untaken or retired
+  // Number of times that each object came back, unused or replaced.
+  std::vector<int> fates(count, 0);
   std::vector<char> was_taken(count, 0);
   bool touched_right = true;
 
@@ -46,7 +47,7 @@ TEST_CASE("a slot hands over 100,000 objects without loss or duplicates", "[lock
       if (leaving == nullptr) {
         if (Counted* const next = slot.take()) {
           if (next->serial <= newest) {
-            touched_right = false;  // an older one after a newer one
+            touched_right = false;  // whether an older object followed a newer one
           }
           newest = next->serial;
           next->touched += 1;
@@ -147,7 +148,7 @@ TEST_CASE("a ring takes all of a bundle or nothing", "[lockfree]") {
   CHECK(ring.push_all(bundle));
   CHECK(ring.push_all({}));
   CHECK_FALSE(ring.push_all(std::vector<int>(10000, 1)));
-  // With 60 of 64 places used, the reserved places stay free.
+  // 60 of 64 places are used: the reserved places stay free.
   CHECK_FALSE(ring.push_all(std::vector<int>(2, 1), 3));
   CHECK(ring.push_all(std::vector<int>(2, 1), 2));
 }

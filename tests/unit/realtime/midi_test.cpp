@@ -46,7 +46,7 @@ TEST_CASE("every channel message becomes an event", "[midi]") {
   check_event(events[4], EventKind::pressure, 2, 0, 1.0);
   check_event(events[5], EventKind::bend, 1, 0, 0.0);
   check_event(events[6], EventKind::note_off, 0, 63,
-              usual_release_velocity);  // a note on with velocity 0
+              usual_release_velocity);  // a note on with velocity 0 is a note off
 }
 
 TEST_CASE("the bend reaches -1 and 1 exactly", "[midi]") {

@@ -52,7 +52,8 @@ struct Harness {
       process.from_osc.push({.event = note_on(0, key)});
     }
   }
-  // As parts of the period: the time of each block, and the additional time of each voice.
+  // Runs blocks. The time of each block, and the additional time of each voice, are fractions of
+  // the period.
   void run(std::size_t blocks, double fixed, double each = 0.0) {
     for (std::size_t n = 0; n < blocks; ++n) {
       const double share = fixed + each * process.meters().voices;
@@ -78,8 +79,8 @@ struct Harness {
   std::size_t heap_calls = 0;
 };
 
-// The limits that DspLoad sets if a block takes `fixed`, and `each` more for every voice, while all
-// keys are played all the time.
+// The voice limits that DspLoad sets if a block takes `fixed` plus `each` for every voice, while
+// all keys are repeated.
 struct Played {
   int least = keys;
   int last = keys;
@@ -180,18 +181,19 @@ TEST_CASE("voices are limited to those there is time for", "[overload]") {
   const Played heavy = played(10 * second, 0.0, 0.21);
   CHECK(heavy.last == 3);
   CHECK(heavy.changes == 1);
-  // After 500 ms at 5 voices, one remains; at 12 even one is too much, but less than eight.
+  // At 5 per voice one voice remains after 500 ms. At 12 even one voice is too much, but less than
+  // eight.
   CHECK(played(10 * second, 0.0, 12.0).last == 1);
   // A load that fits is not reduced.
   CHECK(played(10 * second, 0.0, 0.11).changes == 0);
 }
 
 TEST_CASE("voices are not stolen if that does not lower the load", "[overload]") {
-  // Full, but it fits: after one attempt without effect there is no other.
+  // The period is full, but the load fits: one attempt has no effect, and no other follows.
   const Played full = played(10 * second, 0.95, 0.0);
   CHECK(full.changes == 1);
   CHECK(full.least == 6);
-  // Too much with any number of voices: all come back and stay for a while.
+  // The load is too much with any number of voices: all voices return and stay for a while.
   const Played fixed = played(5 * second, 1.4, 0.0);
   CHECK(fixed.changes == 4);  // to 4, 2, 1, and back to all
   CHECK(fixed.least == 1);
@@ -271,7 +273,7 @@ TEST_CASE("one or two slow blocks steal no voice", "[overload]") {
   harness.process.meters_were_read.raise();
   harness.run(2, 0.1);
   CHECK(meters().cpu_peak == Approx(0.1).epsilon(1e-6));
-  // Three of five spans are more than a hiccup.
+  // Three slow spans of five are an overload; fewer are not.
   harness.run(3, 30.0);
   harness.run(2, 0.1);
   CHECK(meters().shed == keys - 1);

@@ -186,7 +186,7 @@ TEST_CASE("an event for one model does not act in another", "[process]") {
 
 TEST_CASE("a thousand changes of the model under sounding notes make no step", "[process]") {
   const std::string texts[] = {scenes::poly_triangle("0.0005"), ringing_string()};
-  // The steps of each model alone with the same note.
+  // The steps of each model played alone with the same note.
   double own_step = 0.0;
   double own_peak = 0.0;
   for (const std::string& text : texts) {

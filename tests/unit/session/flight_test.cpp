@@ -205,8 +205,8 @@ TEST_CASE("A flight reproduces program changes that let the last model ring", "[
   check_same(stage.heard, played_back(path));
 }
 
-// Of two programs that share notes, each records all notes and plays its own part, from one
-// instrument to the next.
+// Two programs share the notes. Each records all notes and plays only its own part, and its
+// instruments change.
 TEST_CASE("A flight of a program that shares the notes plays its own part", "[flight]") {
   const Folder folder;
   std::vector<float> sounds[3];

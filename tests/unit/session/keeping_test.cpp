@@ -45,7 +45,7 @@ struct LoadedHarness {
 TEST_CASE("a parameter learns the next knob that moves, and forgets it", "[keeping]") {
   LoadedHarness fixture;
   Harness& h = fixture.harness;
-  turn(h, 20, 0.9);  // before anybody asked
+  turn(h, 20, 0.9);  // before anyone has requested it
   CHECK(has(h.say("learn M_k"), "m_K"));
   turn(h, 21, 0.25);
   REQUIRE(comes_true(h, [&] { return h.session.learned().size() == 1; }));
@@ -91,7 +91,7 @@ TEST_CASE(
   CHECK(has(h.say("load \"MY OWN\""), "my own: 3 masses"));
   h.play();
   CHECK(*h.session.parameter("m_K") == 0.125);
-  CHECK(h.session.learned().empty());  // now it is the preset's own control
+  CHECK(h.session.learned().empty());  // now it belongs to the preset
   turn(h, 33, 1.0);
   CHECK(comes_true(h, [&] { return h.session.parameter("m_K") == 0.2; }));
   // OSC may load the user's presets too.

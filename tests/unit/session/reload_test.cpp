@@ -283,7 +283,7 @@ TEST_CASE("A file is watched however it is written", "[reload]") {
         folder.write("m.mdl", model_text("0.012"));
       },
       "0.012");
-  // In two parts: the file is not read until it is closed.
+  // Written in two parts: the watch reads the file only after it is closed.
   told(
       [&] {
         std::ofstream out(folder.file("m.mdl"));
@@ -293,7 +293,7 @@ TEST_CASE("A file is watched however it is written", "[reload]") {
         out << text.substr(60);
       },
       "0.013");
-  // A link replaces it, and then its target changes.
+  // A symbolic link replaces the file, and then the link's target changes.
   folder.write("far.mdl", model_text("0.014"));
   told(
       [&] {

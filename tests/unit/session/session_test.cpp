@@ -165,7 +165,8 @@ TEST_CASE("Hundreds of swaps while notes sound cause no clicks, leaks or crashes
   const std::size_t before = support::heap_bytes();
   for (int n = 0; n < support::of_all(250, 1000); ++n) {
     REQUIRE(session.load_and_wait(n % 2 == 0 ? hard : soft));
-    wait_for_blocks(player, n % 50);  // some wait for the end of the fade, some come during it
+    // some loads wait for the end of the fade, some come during it
+    wait_for_blocks(player, n % 50);
   }
   // The worker has to collect the last engine before memory is counted.
   std::size_t after = support::heap_bytes();
@@ -247,7 +248,7 @@ TEST_CASE("The scene is compiled again for another rate, once", "[session]") {
   const std::string file = folder.write("quick.mdl", model_text);
   Process process(48000.0);
   Session session(process, at_48k(), {});
-  session.set_rate(44100.0);  // before anything is loaded
+  session.set_rate(44100.0);  // before a scene is loaded
   REQUIRE(session.load_and_wait(file));
   const std::uint32_t first = session.current()->serial;
   session.set_rate(96000.0);
@@ -310,7 +311,7 @@ TEST_CASE("Repeated problems are reported once, with their number", "[session]")
   }
   REQUIRE_FALSE(process.send_ahead(std::vector<TimedEvent>(Process::max_ahead, late)));
   ear.block(751);
-  // The reported number of occurrences; the worker may look during the block.
+  // Returns the reported number of occurrences; the worker may read the counter during the block.
   const auto count = [&](const std::string& news) {
     const std::lock_guard lock(mutex);
     int times = 0;

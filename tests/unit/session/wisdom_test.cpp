@@ -159,7 +159,7 @@ TEST_CASE(
     CHECK(comparison.relative() < 1e-11);
   }
   REQUIRE(fs::exists(folder.file()));
-  // The next run takes it at once and measures nothing.
+  // The next run uses the cheap form at once and measures nothing.
   {
     Stage stage(folder, cheap);
     const auto again = stage.session.load_and_wait(path);
@@ -168,7 +168,7 @@ TEST_CASE(
     CHECK_FALSE((*again)->plan.parts.at(0).is_untimed);
     CHECK(stage.calls == 0);
   }
-  // A damaged file is measured again and rewritten.
+  // A damaged file is ignored: the times are measured again and the file is rewritten.
   std::ofstream(folder.file()) << "{\"half";
   {
     Stage stage(folder, cheap);

@@ -150,7 +150,7 @@ void take_mass_of_four_points(const SolidMesh& mesh, double density, SolidMatric
       }
       for (std::size_t a = 0; a < 10; ++a) {
         for (std::size_t b = 0; b < 10; ++b) {
-          if (element[a] >= element[b]) {  // Nothing is clamped: rows are nodes.
+          if (element[a] >= element[b]) {  // All nodes are free, so rows are nodes.
             matrices.mass.value[matrices.mass.find(element[a], element[b])] +=
                 0.25 * density * volume * n[a] * n[b];
           }
@@ -172,7 +172,7 @@ Case random_case(int seed, bool is_fine) {
           {"", random.uniform(1e9, 3e11), random.uniform(0.05, 0.42), random.uniform(500.0, 1e4)}};
 }
 
-// With CalculiX's own mass matrix: to the printed digits.
+// Returns the largest error with CalculiX's own mass matrix: equal to the printed digits.
 double worst_with_its_mass(int seed) {
   const auto [mesh, material] = random_case(seed, false);
   SolidMatrices matrices = solid_matrices(mesh, material, {}, Progress());
@@ -194,7 +194,8 @@ double worst_with_its_mass(int seed) {
   return worst;
 }
 
-// With the exact mass, on a mesh fine enough for the integration rule not to matter.
+// Returns the largest error with the exact mass, on a mesh so fine that the integration rule does
+// not matter.
 double worst_as_they_come(int seed) {
   const auto [mesh, material] = random_case(seed, true);
   const auto modes = find_solid_modes(mesh, material, {}, modes_compared, Progress());

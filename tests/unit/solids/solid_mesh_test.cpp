@@ -73,7 +73,7 @@ TEST_CASE("a box is recognised in any orientation, and nothing else is", "[solid
       }
       CHECK(distance < 1e-9);
     }
-    // With one corner moved it is no box.
+    // A box with one corner moved is not a box.
     box.points[random.below(8)][random.below(3)] += 0.05;
     closed = close_surface(box, Progress());
     REQUIRE(closed);

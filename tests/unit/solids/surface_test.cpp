@@ -83,7 +83,7 @@ TEST_CASE("unreadable files are reported with the line", "[surface]") {
 
 TEST_CASE("an open surface names its edges", "[surface]") {
   Surface box = box_surface({1.0, 2.0, 3.0});
-  box.triangles.pop_back();  // Of the side x = 1: corners 1, 7, 5.
+  box.triangles.pop_back();  // The triangle of corners 1, 7 and 5 on the side x = 1.
   const auto open = closed(box);
   REQUIRE_FALSE(open);
   const std::string& said = open.error().message;
