@@ -26,7 +26,6 @@ struct Workload {
   double highest_factor = 1.0;   // on every stiffness, that the published scheme bears
   double wanted_factor = 1.0;    // that keys ask for
   double moving = 0.25;          // share of the samples in which some parameter moves
-  bool is_untuned = false;       // no voice ever has another one than 1
   Executor* executor = nullptr;  // that large parts may be shared out to; null: one core for all
   bool reaches_beyond() const { return wanted_factor > highest_factor; }
 };

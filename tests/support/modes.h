@@ -10,12 +10,11 @@
 namespace ressort::support {
 
 inline Program in_modes(const std::string& text, Passivity passive = Passivity::never,
-                        const Budget& budget = {}, bool is_crossed = false) {
+                        const Budget& budget = {}) {
   Program program = program_of(text, passive);
-  std::optional<Modes> modes = modal_form(program, budget, {}, is_crossed);
+  std::optional<Modes> modes = modal_form(program, budget);
   INFO(text);
   REQUIRE(modes);
-  REQUIRE(modes->is_crossed == is_crossed);
   program.form = std::move(*modes);
   return program;
 }

@@ -35,15 +35,12 @@ template <class T>
 struct ModalShapes {
   std::size_t modes;
   std::size_t stride;
-  std::size_t row;      // numbers from one shape to the next; crossed modes have two parts of each
   const T* stiffness;   // factors, of each share in the packs where it has any
   const T* damping;     // the same
   T* pushes;            // [push][mode], followed without a gap by places and outputs
   T* places;            // [place][mode]
   T* outputs;           // [output][mode]
   const T* unscaled;    // [push, place, output][mode] of exact modes, as the form has them
-  T* speeds;            // [place][mode] of crossed modes: velocity of the place
-  const T* pole;        // [part][mode] of crossed modes, minus 1
   const T* push_norm;   // [push] length of the shape
   const T* place_norm;  // [place]
 };
@@ -51,7 +48,6 @@ struct ModalShapes {
 // The oscillators, d -= k q + z d, q += d, and how their coefficients change.
 struct ModalMotionPace {
   bool is_stale = true;            // k, z and compliance do not follow from `used`
-  bool is_first = false;           // the first sample of crossed modes
   std::uint32_t fresh_frames = 0;  // since set_state(); up to 2
 };
 template <class T>
@@ -230,7 +226,7 @@ using ModalStep = void (*)(const Program& program, const Modes& modes, ModalStat
                            const Block<T>& block);
 
 template <Isa isa, class T>
-ModalStep<T> modal_step(bool is_crossed);
+ModalStep<T> modal_step();
 
 template <class T>
 class ModalKernel final : public Kernel<T> {

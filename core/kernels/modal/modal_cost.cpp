@@ -90,7 +90,7 @@ double operations(const Program& program, const Modes& form, const Workload& loa
   const Rows rows{.places = places + static_cast<double>(2 * force_count(form)),
                   .heard = static_cast<double>(form.outputs.size()),
                   .pushed = static_cast<double>(form.pushes.size())};
-  return all_operations(program, (form.is_crossed ? 2.0 : 1.0) * form.modes, rows, places, load);
+  return all_operations(program, form.modes, rows, places, load);
 }
 
 double least_modal_operations(const Program& program, const Workload& load) {
@@ -107,8 +107,7 @@ std::string description(const Program&, const Modes& form) {
     text = std::to_string(form.modes) + " of " + count_of(form.of, "mode", "modes") +
            ", the rest at most " + in_db(form.left_out) + ",";
   }
-  text += form.is_crossed ? " of crossed damping in place of the masses, "
-                          : " in place of the masses, ";
+  text += " in place of the masses, ";
   if (form.is_exact) {
     text += "true to the continuous network, ";
   }
@@ -128,9 +127,7 @@ std::uint64_t voice_bytes(const Program& program, const Modes& form, std::uint64
       factors += share.factor.size() + widest_bytes / number_bytes;
     }
   }
-  const std::uint64_t crossed = form.is_crossed ? 6 + rows + 4 * form.places.size() : 0;
-  return node_bytes(program, number_bytes) +
-         number_bytes * ((rows + crossed) * form.modes + factors);
+  return node_bytes(program, number_bytes) + number_bytes * (rows * form.modes + factors);
 }
 
 }  // namespace ressort::kernels
