@@ -5,7 +5,7 @@
 
 namespace ressort {
 
-// Figures stand alone.
+// Figures depend on no other room.
 namespace plot {}
 
 namespace realtime {

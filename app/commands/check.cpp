@@ -131,7 +131,7 @@ json stability_json(const Proved& proved) {
   return out;
 }
 
-// Deviations as JSON; null where a number is unknown.
+// Returns the deviations as JSON; unknown numbers are null.
 json accuracy_json(const Accuracy& accuracy) {
   const auto figure = [&](double value) { return accuracy.is_known ? limit_json(value) : json(); };
   return {{"cents", figure(accuracy.cents)},
@@ -139,7 +139,7 @@ json accuracy_json(const Accuracy& accuracy) {
           {"is_bound", accuracy.is_bound}};
 }
 
-// A budget of pitch or decay as JSON; "kept" is null where it is unknown.
+// Returns a budget of pitch or decay as JSON; "kept" is null if unknown.
 json budget_json(const Plan& plan) {
   json out = accuracy_json(*plan.accuracy);
   out["asked"] = print_budget(plan.budget);
@@ -312,7 +312,7 @@ int check(const CheckOptions& options) {
   if (!compiled) {
     return exit_code::wrong_use;
   }
-  // Also reports on models that may not be played, to help to repair them.
+  // Also reports on models that may not be played, because that helps to repair them.
   if (options.as == CheckAs::report) {
     print_report(*reading.scene, *compiled, *proved);
   } else if (options.as == CheckAs::model) {

@@ -19,7 +19,8 @@ struct RenderOptions {
   std::string name;    // model or preset
   std::string output;  // sound file; the extension selects the format
   double rate_hz = 44100.0;
-  std::optional<double> seconds;    // at most one of these; by default the length of the score or
+  // at most one of the next two; default: the length of the score, or of
+  std::optional<double> seconds;
   std::optional<long long> frames;  //   the input and two seconds of decay, or of the MIDI file
                                     //   and its decay, at most a minute
   std::string input;                // sound file; channel N drives input N

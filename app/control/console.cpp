@@ -60,7 +60,7 @@ Result<const Row*> find_command(std::string_view name) {
   if (meant.size() == 1) {
     return found;
   }
-  std::string typed = "'";  // Printed without control characters.
+  std::string typed = "'";  // The text is printed without control characters.
   for (const char c : name.substr(0, 40)) {
     typed += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? '?' : c;
   }
@@ -79,7 +79,7 @@ std::string usage(const Row& row) {
   return std::string(row.command) + (row.words.empty() ? "" : " ") + row.words;
 }
 
-// Returns lines that work when pasted, made from what is installed.
+// Returns example lines that work when pasted, made from the installed models and presets.
 std::string examples(const ConsoleContext& console) {
   std::vector<std::string> known = known_presets();
   if (known.empty()) {
@@ -195,7 +195,7 @@ Result<Command> parse_command(std::string_view line) {
   const auto needed = static_cast<std::size_t>(
       std::count_if(wanted.begin(), wanted.end(),
                     [](const std::string& word) { return !word.starts_with('['); }));
-  // A word written as [--WORD] may be omitted but not replaced.
+  // A word written as [--WORD] may be omitted but not replaced by another word.
   bool is_other = false;
   for (std::size_t i = needed; i < std::min(words.size(), wanted.size()); ++i) {
     is_other |= wanted[i].starts_with("[--") && wanted[i] != "[" + words[i] + "]";

@@ -21,7 +21,7 @@ struct ConsoleContext {
   FigureValues timbre = {};  // Values of the last `timbre` command.
 };
 
-// Returns the current scene; null before anything was loaded.
+// Returns the current scene; null before the first load.
 std::shared_ptr<const Loaded> loaded(const ConsoleContext& console);
 
 extern const Error nothing_loaded;

@@ -7,8 +7,8 @@
 namespace ressort::control {
 namespace {
 
-// Matches `c` with one element of a pattern other than '*'. `length` is the length of that element,
-// 0 if it matches no single character.
+// Matches `c` with one element of a pattern other than '*'. Sets `length` to the length of that
+// element, 0 if it matches no single character.
 bool fits_one(std::string_view pattern, char c, std::size_t& length) {
   length = 1;
   if (pattern[0] == '?') {

@@ -1,5 +1,5 @@
-// app/control: a message as people write it: an address and its arguments, from OSC, from a line of
-// a score or from words. Pure text; registry.h defines what a message does.
+// app/control: a message as text: an address and its arguments, from OSC, from a line of a score or
+// from words of the console. Pure; registry.h defines the effect of a message.
 #pragma once
 
 #include <string>

@@ -96,12 +96,12 @@ struct FoundRow {
 };
 FoundRow find_row(std::string_view address);
 
-// Returns whether a preset must not use the address for a control: it is a built-in address or a
-// reply.
+// Returns whether an address is a built-in address or a reply, so that a preset must not use it for
+// a control.
 bool is_reserved(std::string_view address);
 
-// Returns whether the address is one that the program sends. Another instance may send such
-// messages to us if somebody forged our address.
+// Returns whether the program itself sends messages with this address. Another instance may send
+// such messages to us if a client has forged our address.
 bool is_answer(std::string_view address);
 
 // Returns the events of a playing message, all at frame 0. Parameter values are clamped to their

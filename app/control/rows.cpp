@@ -70,8 +70,8 @@ Events play_input(const Said& said, const GestureRow& gesture) {
                     .value2 = said.arguments[1]});
 }
 
-// Finds the mass NAME, or "NAME:3", the third mass of a macro, or the place "NAME:0.3"; else
-// returns the reason why there is none.
+// Finds the mass NAME, the third mass of a macro as "NAME:3", or the place "NAME:0.3". Otherwise
+// returns the reason why it does not exist.
 Result<std::uint32_t> find_mass(std::span<const StruckInfo> known, std::string_view name) {
   const auto find = [&](std::string_view wanted) {
     const auto found =

@@ -237,7 +237,7 @@ struct Terminal::Input {
       read_lines();
       return;
     }
-    // In the background, access to the terminal would stop the whole program, sound included.
+    // Access to the terminal from the background would stop the whole program, including the sound.
     if (tcgetpgrp(STDIN_FILENO) != getpgrp()) {
       return;
     }
@@ -360,7 +360,8 @@ struct Terminal::Input {
 
   void read_keys(const std::function<bool(char)>& on_key) {
     using Clock = std::chrono::steady_clock;
-    // Shorter than a second keystroke can be: the keyboard repeats a key that is held down.
+    // Shorter than the shortest time between two keystrokes: the keyboard repeats a key that is
+    // held down.
     constexpr std::chrono::milliseconds repetition{60};
     const RawMode raw;
     char last = 0;

@@ -116,7 +116,7 @@ int on_sample_rate(jack_nframes_t rate, void* self) {
   return 0;
 }
 
-// In freewheel mode (a bounce) there is no deadline, and every event keeps its frame.
+// A freewheeling server (a bounce) has no deadline, and every event keeps its frame.
 void on_freewheel(int starts, void* self) {
   const CancellationDisabled guard;
   Flag& has_time = static_cast<Jack*>(self)->process.has_time;
@@ -262,7 +262,8 @@ void update_wiring(Jack& jack, bool is_quiet) {
     return jack_port_by_name(jack.client, port.c_str()) != nullptr;
   };
   jack.wiring.update(present, exists, is_quiet);
-  // Keep the names while a cable is doubtful: the notification that its port is gone may follow.
+  // Keeps the names while a connection is in doubt: the notification that its port is gone may
+  // follow.
   if (!jack.wiring.is_in_doubt()) {
     jack.connected_names.clear();
   }

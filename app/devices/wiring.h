@@ -28,7 +28,7 @@ class Wiring {
   void update(const std::vector<Cable>& present,
               const std::function<bool(const std::string& port)>& exists, bool is_quiet);
 
-  // Returns true if a connection is gone and a later update will tell why.
+  // Returns true if a connection is gone and a later update will show why.
   bool is_in_doubt() const;
 
   // Returns the connections to restore once both ports exist.

@@ -192,7 +192,7 @@ Picture make_picture(Engine& engine, const Network& network, std::uint32_t numbe
     group.waveguides = take_waveguides(program, network, chosen.nodes, group.first);
     group.waveguides.resize(std::min(group.waveguides.size(), waveguides));
     if (group.numbers() > room || (modes != nullptr && !group.is_modal) || group.numbers() == 0) {
-      chosen.nodes.clear();  // It is drawn at rest.
+      chosen.nodes.clear();  // The waveguide is drawn at rest.
       group.count = 0;
       group.is_modal = false;
       group.modes = 0;
@@ -223,7 +223,7 @@ void find_positions(const Picture& picture, const MotionFrame& frame, std::span<
     const double* const numbers = frame.numbers.data() + at;
     float* const x = positions.data() + group.first;
     for (std::size_t mode = 0; mode < group.modes; ++mode) {
-      // Less than 160 dB below 1 is invisible.
+      // A displacement more than 160 dB below 1 is invisible.
       const auto q = static_cast<float>(numbers[mode] - group.start_q[mode]);
       if (std::fabs(q) > 1e-8f) {
         const float* const shape = group.shapes.data() + mode * group.count;

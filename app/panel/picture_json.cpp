@@ -253,7 +253,7 @@ class NetworkTeller {
     }
   }
 
-  // Puts a driven input in the middle of the nodes that it touches.
+  // Places a driven input in the middle of the nodes that it is linked to.
   void place_hands() {
     std::map<std::uint32_t, std::vector<std::uint32_t>> touched;
     for (const Link& link : network_.links) {

@@ -11,10 +11,11 @@
 
 namespace ressort::panel {
 
-// Returns the same as OSC's /describe and what else the page needs: {"name", "serial", "addresses":
-// [{"address", "arguments", "does"}], "parameters": [{"name", "value", "minimum", "maximum",
-// "lowest", "highest", "audio_input"}], "controls": ["/finger"], "inputs": [...], "models": [],
-// "presets": [], "warnings": [], ...}. A missing limit is null. [any thread but audio]
+// Returns the data of OSC's /describe and everything else that the page needs: {"name", "serial",
+// "addresses": [{"address", "arguments", "does"}], "parameters": [{"name", "value", "minimum",
+// "maximum", "lowest", "highest", "audio_input"}], "controls": ["/finger"], "inputs": [...],
+// "models": [], "presets": [], "warnings": [], ...}. A missing limit is null. [any thread but
+// audio]
 std::string describe_json(const Session& session);
 
 // Returns every figure of `status` by its name, and the timbre: "centroid_hz", "spread_hz",

@@ -248,7 +248,7 @@ class ScriptWriter {
     return plot;
   }
 
-  // A plot without axes whose key is all that is seen of it.
+  // Draws a plot without axes, of which only the key is visible.
   void write_legend() {
     write_edges(0.0, width_, 0.0, height_);
     script_ +=

@@ -13,13 +13,13 @@ namespace ressort::plot {
 inline constexpr const char* ink = "#222222";
 inline constexpr const char* accent = "#c8402f";
 
-// Six significant digits; "NaN" where it is not finite.
+// Prints six significant digits; "NaN" if the value is not finite.
 std::string number(double value);
 
-// One line of a series' data. A value that is not finite is written as NaN, which interrupts a
-// curve.
+// Returns one line of a series' data. A value that is not finite is written as NaN, which
+// interrupts a curve.
 std::string row(std::initializer_list<double> values);
-// The same with a text behind it, for the style "labels".
+// The same with a text at the end, for the style "labels".
 std::string row(std::initializer_list<double> values, const std::string& text);
 
 struct Series {
@@ -37,10 +37,10 @@ struct Tick {
 
 struct Axis {
   std::string title;
-  double from = 0.0;  // `from` equal to `to`: gnuplot finds the range
+  double from = 0.0;  // If `from` equals `to`, gnuplot chooses the range.
   double to = 0.0;
   bool is_logarithmic = false;
-  std::vector<Tick> ticks;  // empty: gnuplot finds them
+  std::vector<Tick> ticks;  // If empty, gnuplot chooses the ticks.
 };
 
 // A logarithmic axis with ticks at 1, 2 and 5 of every decade: "500", "1k", "2k".
@@ -54,22 +54,22 @@ struct Panel {
   Axis x;
   Axis y;
   std::vector<Series> series;
-  double height = 0.0;       // pixels; 0: as the figure says
+  double height = 0.0;  // pixels; 0: as in the figure
   double left_margin = 0.0;  // pixels; 0: room for numbers
   bool has_axes = true;      // false: curves alone, in the whole panel
   bool is_solid = false;     // the data are points in space: x, y, z, and the colour for "pm3d"
-  bool is_true = false;      // a unit is as long in x as in y
+  bool is_true = false;  // one unit has the same length in x and y
   std::string note;          // a sentence in the middle, for a panel without data
   ColourMap colours = ColourMap::none;
   double lightest = 0.0;  // the ends of the colour map
   double darkest = 1.0;
   std::string scale_title;          // of the colour scale at the right; empty: no scale
-  bool has_room_for_scale = false;  // beside a panel with a scale
+  bool has_room_for_scale = false;  // beside a panel with a colour scale
 };
 
 struct Figure {
   std::string title;
-  std::string caption;         // below everything; '\n' starts a new line
+  std::string caption;  // below the panels; '\n' starts a new line
   double panel_width = 420.0;  // pixels
   double panel_height = 260.0;
   std::size_t columns = 1;
@@ -78,10 +78,10 @@ struct Figure {
   std::size_t legend_columns = 3;
 };
 
-// The commands for gnuplot that draw the figure as SVG to its standard output. Pure.
+// Returns the gnuplot commands that draw the figure as SVG to standard output. Pure.
 std::string to_script(const Figure& figure);
 
-// Fails where gnuplot is missing, and says what to install. [control]
+// Fails if gnuplot is missing, with advice on what to install. [control]
 Result<Done> check_gnuplot();
 
 // Runs gnuplot and returns what it draws. [control] 0.1 s and more

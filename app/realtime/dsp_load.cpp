@@ -5,7 +5,7 @@
 namespace ressort::realtime {
 namespace {
 
-// Stealing voices did not help if the load stays above this share of what it was.
+// Stealing voices did not help if the load stays above this fraction of the previous load.
 constexpr double unmoved = 0.9;
 
 // Returns how many of `sounding` equally expensive voices there is time for.
@@ -65,7 +65,7 @@ std::optional<int> DspLoad::give_way(int sounding, int all) {
     if (limit_ == 0 || lasting_ < unmoved * first_) {
       return {};
     }
-    // Something else than the voices is expensive.
+    // The load has another cause than the voices.
     begin_anew();
     waits_s_ = patience_s;
     return all;

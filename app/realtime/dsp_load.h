@@ -10,8 +10,8 @@
 namespace ressort::realtime {
 
 // Measures the load of the callback and limits the number of voices. One slow block does not count,
-// because the machine holds up any thread now and then: voices are stolen only when the median of
-// the last `spans` spans is too high. All functions: [audio], wait-free.
+// because the operating system delays any thread now and then. Voices are stolen only if the median
+// of the last `spans` spans is too high. All functions: [audio], wait-free.
 class DspLoad {
  public:
   static constexpr std::size_t spans = 5;
@@ -34,9 +34,9 @@ class DspLoad {
   std::optional<int> judge(int sounding, int all);
   int limit() const { return limit_; }  // voices; 0: no limit
 
-  // Removes the limit and forgets the measurements: another model plays from now on.
+  // Removes the limit and forgets the measurements, because another model plays from now on.
   void begin_anew();
-  // Forgets the measurements, because voices were just stolen.
+  // Forgets the measurements, because voices have just been stolen.
   void forget();
 
  private:

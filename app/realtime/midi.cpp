@@ -51,7 +51,7 @@ bool MidiReader::take(std::uint8_t byte, Event& event) {
     return false;
   }
   if (status_ == 0 || need_ == 0) {
-    ++malformed_;  // data without a status byte that wants it
+    ++malformed_;  // a data byte without a status byte before it
     return false;
   }
   data_[have_++] = byte;

@@ -565,7 +565,8 @@ void Process::record(std::size_t channels, std::size_t frames, bool records, boo
       ++meters_.record_lost;
     }
     if (listens) {
-      listening.push(piece);  // a reader that finds the ring full knows that it lost some
+      // A reader that finds the ring full knows that it has lost some chunks.
+      listening.push(piece);
     }
   }
 }

@@ -124,7 +124,8 @@ struct Process {
   static constexpr std::size_t max_ahead = 4096;    // events that wait for their frame
   static constexpr double fade_s = 0.05;            // crossfade between two models
   static constexpr double longest_strobe_s = 0.1;   // longest wait for a frame of the stroboscope
-  static constexpr double looked_for_s = 1.0;     // the output is kept so long after a motion frame
+  // the output is kept for this long after a motion frame
+  static constexpr double looked_for_s = 1.0;
   static constexpr double longest_ring_s = 60.0;  // of the model before a program change
 
   // A monotonic clock in ns that makes no system call.
@@ -263,7 +264,7 @@ struct Process {
   bool keeps_every_frame_ = false;
   bool is_repeating_ = false;
   std::size_t tape_at_ = 0;  // frame
-  // State of the flight log: what it was told last.
+  // State of the flight log: the values that were recorded last.
   bool has_gap_ = false;
   double kept_rate_hz_ = 0.0;
   std::size_t kept_frames_ = 0;
@@ -280,7 +281,7 @@ struct Process {
   std::array<float, MotionFrame::heard_samples> heard_{};
   std::size_t heard_at_ = 0;          // position of the next sample
   std::int64_t looked_until_ = 0;     // frame
-  PlayingEngine* strobed_ = nullptr;  // engine that was asked for a stroboscope frame
+  PlayingEngine* strobed_ = nullptr;  // engine from which a stroboscope frame was requested
   std::int64_t strobed_until_ = 0;    // frame
 };
 

@@ -23,9 +23,9 @@ struct SessionOptions {
   std::optional<ThirdArgument> third;  // overrides every model's own meaning
   KeyOptions keys;                     // overrides every preset's tuning
   bool watch = false;                  // reload the playing scene when its files change
-  bool keeps_flights = false;          // record flights and save them after problems
-  // How forms are measured, and the file that keeps the results. Without the first nothing is
-  // measured, and without the second nothing is kept.
+  bool keeps_flights = false;  // records flights and saves them after problems
+  // The clock that measures forms, and the file that keeps the results. Without a clock no form is
+  // measured, and without a file no result is kept.
   decltype(Timings::time) time = {};
   std::string wisdom_path = {};
 };

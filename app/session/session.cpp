@@ -26,7 +26,7 @@ FlightSetup flight_setup(const SessionOptions& options) {
           .keys = options.keys};
 }
 
-// Inquiries are stopped only for loads.
+// Only a load interrupts an inquiry.
 template <class T>
 Result<T> explained(Result<T> result) {
   return result || result.error().message != stopped

@@ -43,8 +43,8 @@ class Session {
   using Present = CurrentScene::Present;
   using PictureOf = EngineSupply::PictureOf;
 
-  // `on_message` receives messages about events that nobody asked for, such as an unstable voice,
-  // on the worker's thread. The process must outlive the session.
+  // `on_message` receives messages about unrequested events, such as an unstable voice, on the
+  // worker's thread. The process must outlive the session.
   Session(Process& process, const SessionOptions& options, MessageHandler on_message);
   ~Session();
 

@@ -15,7 +15,8 @@ namespace {
 using nlohmann::json;
 
 constexpr std::size_t most_file_bytes = std::size_t{4} << 20;
-constexpr std::size_t most_entries = 20'000;  // more, and only those of this run stay
+// If there are more, only the entries of this run are kept.
+constexpr std::size_t most_entries = 20'000;
 
 std::string cpu_name() {
   std::ifstream info("/proc/cpuinfo");

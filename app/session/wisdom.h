@@ -10,7 +10,7 @@
 
 namespace ressort::session {
 
-// Returns the file in the user's cache; empty if nobody's home is known.
+// Returns the file in the user's cache; empty if the home folder is unknown.
 std::string wisdom_path();
 
 // A store of numbers by key. The program's version and the processor's model are part of every key,

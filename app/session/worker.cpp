@@ -91,7 +91,7 @@ void Worker::load(const LoadJob& job) {
   const auto result = request ? builder_.load(*request) : request.error();
   if (result) {
     loaded_ = *request;
-    loaded_->lets_ring = false;  // not when it is compiled again
+    loaded_->lets_ring = false;  // not if it is compiled again
     current_.set_last_change(std::move(change));
   }
   if (job.answer) {
@@ -115,7 +115,7 @@ void Worker::rebuild_at_new_rate() {
     builder_.measure_parts();
   } else if (!queue_.has_newer_load()) {
     on_message_(result.error().message);
-    queue_.set_built_rate(rate_hz);  // it is not tried again and again
+    queue_.set_built_rate(rate_hz);  // so that the compilation is not tried again and again
   }
 }
 

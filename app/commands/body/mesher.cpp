@@ -76,7 +76,7 @@ Result<Done> run(std::vector<std::string> words, const TemporaryFolder& folder, 
                  std::error_code(errno, std::generic_category()).message()};
   }
   if (child == 0) {
-    setpgid(0, 0);                     // Ctrl-C reaches only this process, which ends the child
+    setpgid(0, 0);  // Ctrl-C reaches only this process, which then ends the child.
     prctl(PR_SET_PDEATHSIG, SIGKILL);  // the child ends with this process
     const int out = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
     const int in = open("/dev/null", O_RDONLY | O_CLOEXEC);

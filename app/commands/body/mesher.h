@@ -29,9 +29,9 @@ struct Meshed {
   std::string by;  // "gmsh"
 };
 
-// Meshes the solid. Errors say what to install, or have the last messages of the mesher. `goes_on`,
-// which is called some times a second, returns false to end the mesher; the error is `stopped`
-// then.
+// Meshes the solid. Errors say what to install, or contain the last messages of the mesher.
+// `goes_on` is called a few times a second; if it returns false, the mesher is ended and the error
+// is `stopped`.
 Result<Meshed> fill_with_tetrahedra(const ClosedSurface& closed, const MeshOrder& order,
                                     const std::function<bool()>& goes_on);
 

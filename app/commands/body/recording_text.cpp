@@ -67,7 +67,7 @@ std::string header(const Identification& found, const std::string& source) {
       ", from " + number("%.4g", found.analysed_s) + " s after the blow at " +
       number("%.4g", found.onset_s) +
       " s.\n# Not explained by them: " + number("%.1f", found.residual_db) + " dB of all";
-  const double quiet = -100.0;  // octaves below which nothing is to be explained
+  const double quiet = -100.0;  // octaves below this level contain nothing to explain
   for (const OctaveResidual& octave : found.octaves) {
     if (octave.level_db > quiet) {
       text += "; " + number("%.0f", std::sqrt(octave.low_hz * octave.high_hz)) + " Hz " +

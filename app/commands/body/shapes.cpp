@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::size_t most_modes = 12;
 constexpr std::size_t most_triangles = 60'000;  // of the whole figure
-constexpr double bend = 0.09;                   // largest displacement, in shares of the diagonal
+constexpr double bend = 0.09;  // largest displacement, as a fraction of the diagonal
 
 plot::Panel shape_panel(const SolidMesh& mesh, const SolidModes& modes, std::size_t k,
                         const std::vector<SolidPlace>& places) {
@@ -33,7 +33,7 @@ plot::Panel shape_panel(const SolidMesh& mesh, const SolidModes& modes, std::siz
   const auto corner = [&](std::size_t i) {
     return plot::row({moved[i][0], moved[i][1], moved[i][2], share[i]});
   };
-  // A triangle is a quadrangle of the style "pm3d" whose last two corners are one.
+  // The style "pm3d" draws quadrangles. A triangle repeats its last corner.
   plot::Series surface{.style = "pm3d", .data = {}, .title = {}, .columns = "1:2:3:4"};
   for (const Triangle& triangle : mesh.surface) {
     surface.data += corner(at(triangle[0])) + corner(at(triangle[1])) + "\n" +

@@ -27,7 +27,7 @@ constexpr double m_per_kg = 44100.0 * 44100.0 * 1e-6;
 constexpr int places_of_our_own = 4;
 constexpr double very_large = 20.0;  // m
 
-Flag called_off;  // by the first Ctrl-C; the second ends the process
+Flag called_off;  // set by the first Ctrl-C; the second ends the process
 
 void watch_for_interrupt() {
   struct sigaction once {};
@@ -305,7 +305,7 @@ int solid_body(const SolidBodyOptions& options) {
     share = stage == "finding its modes" ? 0.6 : stage == "reading the solid" ? 0.0 : 0.3;
     return goes_on(stage);
   });
-  // Reports an error or the interruption. Nothing has been written then.
+  // Reports an error or the interruption. No file has been written in that case.
   const auto failed = [&](const Error& error) {
     if (error.message == stopped) {
       std::fprintf(stderr, "%s: interrupted\n", options.input.c_str());

@@ -62,7 +62,7 @@ struct PlayedWay {
 bool sounds(const ChartScene& scene, Isa isa) {
   auto made = make_way(scene, {.name = "direct", .method = Method::direct}, heard_s, isa);
   if (!made) {
-    return true;  // the reference will report the reason
+    return true;  // the reference solution will report the reason
   }
   const Waves waves = render_way(*made, static_cast<std::size_t>(heard_s * scene_rate_hz));
   return std::any_of(waves.begin(), waves.end(), [](const std::vector<double>& wave) {
@@ -120,7 +120,7 @@ void stay_on_one_core() {
   sched_setaffinity(0, sizeof cores, &cores);
 }
 
-// Plays every method once and keeps the shortest time of each stretch. Returns what it took.
+// Plays every method once and keeps the shortest time of each stretch. Returns the total time.
 double time_round(std::vector<MadeWay>& ways, std::vector<std::vector<double>>& shortest_ns,
                   const std::function<bool()>& stops) {
   const double start = cpu_ns();
@@ -135,7 +135,7 @@ double time_round(std::vector<MadeWay>& ways, std::vector<std::vector<double>>& 
   return cpu_ns() - start;
 }
 
-// Times the methods in turns over the beginning of the scene, as much of it as `patience_s` allows.
+// Times the methods in turn over the beginning of the scene, as much of it as `patience_s` allows.
 // Returns nanoseconds per output sample, [way]; empty if it was stopped.
 std::vector<double> time_ways(std::vector<MadeWay>& ways, double patience_s,
                               const std::function<bool()>& stops) {

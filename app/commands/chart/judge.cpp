@@ -13,14 +13,16 @@ namespace {
 
 constexpr double exact_db = 400.0;         // indistinguishable from exact
 constexpr double trusted_db = 60.0;        // a reference agrees with itself
-constexpr double heard_share = 1e-6;       // of the peak: the sound has begun
-constexpr std::size_t small_scene = 1000;  // masses and links, for 256 times the rate
+constexpr double heard_share = 1e-6;  // relative to the peak: here the sound has begun
+// largest number of masses and links for a reference at 256 times the rate
+constexpr std::size_t small_scene = 1000;
 constexpr std::array<double, 3> windows_s = {0.005, 0.05, heard_s};
 constexpr unsigned stress_times = 16;
 constexpr double stress_s = 0.1;
-constexpr double contact_stress_s = 5.0;  // a contact gains little energy at a time
+constexpr double contact_stress_s = 5.0;  // long, because a contact gains little energy at a time
 constexpr double stress_gain = 1.1;       // of energy, without any work done
-constexpr double stress_excess = 4.0;     // of energy, or twice the peak, above 16 times the rate
+// factor of the energy, or twice that of the peak, relative to 16 times the rate
+constexpr double stress_excess = 4.0;
 
 double stress_length_s(const ChartScene& scene) {
   const auto elements =
@@ -69,7 +71,7 @@ class EnergyMeter {
  private:
   EnergyReading reading_;
   bool has_begun_ = false;
-  double highest_ = -HUGE_VAL;  // while contacts and plucks store nothing
+  double highest_ = -HUGE_VAL;  // while contacts and plucks store no energy
   double held_ = -HUGE_VAL;     // at any time
 };
 
@@ -205,7 +207,7 @@ std::optional<EnergyReading> watch_energy(const ChartScene& scene, MadeWay& way,
     StoredEnergy energy;
     for (std::size_t i = 0; i < programs.size(); ++i) {
       if (x[i].size() != programs[i]->position.size()) {
-        return std::nullopt;  // the kernel steps another set of nodes
+        return std::nullopt;  // the kernel steps different nodes
       }
       for (std::size_t node = 0; node < x[i].size(); ++node) {
         v[i][node] *= times;
@@ -281,7 +283,7 @@ Stress::Stress(const ChartScene& scene, Isa isa) : isa_(isa) {
       const auto energy = watch_energy(one.scene, *fine, seconds);
       one.energy = energy ? energy->highest : HUGE_VAL;
     }
-    // An input that moves too fast to do much work must not make the bounds tighter.
+    // An input that moves too fast to do much work must not tighten the bounds.
     one.peak = std::max(one.peak, cases_[0].peak);
     one.energy = std::max(one.energy, cases_[0].energy);
   }

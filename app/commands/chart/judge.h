@@ -21,7 +21,8 @@ struct References {
   Waves published;
   Waves physical;
   bool is_exact = false;  // the physical reference
-  double floor_db = 0.0;  // agreement of a physical reference that is not exact with half its rate
+  // agreement of a reference that is not exact with the same reference at half its rate
+  double floor_db = 0.0;
   std::string how;        // the physical reference was found
   std::size_t onset = 0;  // first audible sample
   double window_s = 0.0;  // from the onset: the longest in which the reference can be trusted
@@ -33,23 +34,24 @@ struct References {
 // Plays the scene from its start; [channel][output sample] at 44,100 Hz.
 Waves render_way(MadeWay& way, std::size_t frames);
 
-// `stepped` is the scene as a scheme starts it; see Starts. Blocks for seconds where the scene is
-// not linear. Fails where the scene is too large.
+// Finds both references. `stepped` is the scene as a scheme starts it; see Starts. Blocks for
+// seconds if the scene is nonlinear. Fails if the scene is too large.
 Result<References> find_references(const ChartScene& scene, const ChartScene& stepped, Isa isa);
 
-// The highest energy in `seconds`, and the energy at the start. Where links can let go, only
-// moments in which they have count. Empty where a kernel does not know its masses' positions.
+// The highest energy in `seconds`, and the energy at the start. If links can detach, only the
+// moments when all are detached count. Empty if a kernel does not know the positions of its masses.
 struct EnergyReading {
   double first = 0.0;
   double highest = 0.0;
 };
 std::optional<EnergyReading> watch_energy(const ChartScene& scene, MadeWay& way, double seconds);
 
-// Tests methods with a scene as it is and hit ten times harder.
+// Tests methods with a scene, as it is and struck ten times harder.
 class Stress {
  public:
   Stress(const ChartScene& scene, Isa isa);
-  // Returns what goes wrong; empty for a stable method and for one that cannot play the scene.
+  // Returns a description of the instability; empty for a stable method and for one that cannot
+  // play the scene.
   std::string verdict(const Way& way) const;
 
  private:

@@ -13,7 +13,7 @@ const char* const front_style = "steps lw 6 lc rgb '#c4c4c4'";
 const char* const floor_style = "lines dt 3 lw 1.4 lc rgb '#606060'";
 const char* const failed_style = "points pt 2 ps 1.2 lw 2.4 lc rgb '#b00000'";
 
-// Precisions differ in lightness and in their dashes, so that grey print is enough.
+// Precisions differ in lightness and in dash pattern, so the figure is legible in grey.
 const char* style_of(Precision precision) {
   return precision == Precision::float64 ? " dt 1 lc rgb '#000000'" : " dt 2 lc rgb '#e69f00'";
 }

@@ -23,7 +23,7 @@ class ChartPlayer {
   // Plays `frames` samples of the machine's own rate; writes [frame][channel] to `outputs` unless
   // it is null.
   virtual void play(std::size_t frames, double* outputs) = 0;
-  // Copies all positions and velocities. Returns false where a kernel does not know them.
+  // Copies all positions and velocities. Returns false if a kernel does not know them.
   virtual bool save(States& x, States& v) const = 0;
 };
 

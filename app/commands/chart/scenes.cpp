@@ -330,7 +330,8 @@ Starts::Starts(const ChartScene& scene) {
     Network& network = scenes_[i].network;
     for (std::size_t o = 0; o < heard.outputs.size(); ++o) {
       Mass& mass = network.masses[heard.outputs[o].mass];
-      // No link pulls in the first step, which therefore ends where the continuous network is then.
+      // No link exerts a force in the first step. The initial velocity makes this step end at the
+      // position of the continuous network.
       const double way = steps * (course->play(o, 1, 1.0 / steps)[0] - mass.position);
       mass.third = network.third == ThirdArgument::delayed_position
                        ? mass.position - way

@@ -33,9 +33,9 @@ struct ChartScene {
 // Names of the reference scenes.
 const std::vector<std::string>& reference_scenes();
 
-// Returns a reference scene, or a model or a preset by file or name. A linear network at rest
-// starts with x[-1] = x[0] - 0.01 at its first input's mass; others play the gesture of a note of
-// velocity 0.8 at the pitch that is written.
+// Returns a reference scene, or a model or preset by file or name. A linear network at rest starts
+// with x[-1] = x[0] - 0.01 at its first input's mass. Other scenes play the gesture of a note of
+// velocity 0.8 at the pitch of the model.
 Result<ChartScene> chart_scene(const std::string& name);
 
 // Adds an impulse at the mass of every input, or else at the first mass that moves.
@@ -44,9 +44,9 @@ ChartScene struck(const ChartScene& scene);
 // Makes the start and the motions ten times harder.
 ChartScene struck_harder(const ChartScene& scene);
 
-// A scheme knows the velocity of a mass only by its position after the first step. Each length of a
-// step therefore has a scene of its own, in which the masses start towards the position of the
-// continuous network after one step. Scenes that are nonlinear or too large stay as they are.
+// A scheme knows the velocity of a mass only by its position after the first step. Each step length
+// therefore has its own scene, in which the masses start towards the position of the continuous
+// network after one step. Scenes that are nonlinear or too large are not changed.
 class Starts {
  public:
   explicit Starts(const ChartScene& scene);             // [control] seconds for a thousand masses

@@ -23,7 +23,7 @@ struct ChartRow {
   std::string methods;                // of its parts, "modal" or "grid+direct"
   std::vector<std::string> twins;     // methods with the same output
   double ns = 0.0;                    // per output sample, one voice; 0: not timed
-  std::array<double, 2> snr_db{};     // [ChartReference] NaN where it is unknown
+  std::array<double, 2> snr_db{};  // [ChartReference] NaN if unknown
   std::string failure;                // why it is unstable; empty if it is stable
   std::array<bool, 2> is_on_front{};  // [ChartReference]
 };
@@ -44,8 +44,8 @@ struct Trade {
   double snr_db = 0.0;
 };
 
-// Finds the Pareto front: [trade] whether no other is both cheaper and better. The first of equal
-// trades is on it; a trade that is not finite never is.
+// Finds the Pareto front: [trade] whether no other trade is both cheaper and better. Of equal
+// trades the first is on the front. A trade that is not finite never is.
 std::vector<bool> front_of(std::span<const Trade> trades);
 
 // Sets `is_on_front` of the stable rows.

@@ -29,7 +29,7 @@ void add_method(std::vector<Way>& ways, Method method) {
     const std::string line = together(name, asked.name);
     ways.push_back({.name = line, .line = line, .method = method, .budget = asked.budget});
     for (const unsigned times : oversamplings) {
-      if (method == Method::direct) {  // the others have the same error at every rate
+      if (method == Method::direct) {  // The other methods have the same error at every rate.
         const std::string label = std::to_string(times) + "x";
         ways.push_back({.name = line + " " + label,
                         .line = line,

@@ -15,7 +15,7 @@ namespace ressort::commands {
 struct Way {
   std::string name;              // "direct 4x", "modal silence=-60"
   std::string line;              // the curve that joins it to others, in the order of the table
-  std::string label;             // beside its mark; empty for most
+  std::string label;  // text beside its mark; empty for most
   std::optional<Method> method;  // empty: the plan's choice
   std::string budget;            // as for --budget
   unsigned oversampling = 1;
@@ -37,7 +37,7 @@ struct MadeWay {
   const Machine& machine() const { return engine->machine(); }
 };
 
-// Compiles a scene. Fails where this way cannot play the network.
+// Compiles a scene. Fails if this way cannot play the network.
 Result<MadeWay> make_way(const ChartScene& scene, const Way& way, double seconds, Isa isa);
 
 }  // namespace ressort::commands

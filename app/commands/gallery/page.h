@@ -18,7 +18,8 @@ struct ShownNote {
   double fundamental_hz = 0.0;
 };
 
-// Peak and loudness of the phrase; all else of one note at `note_velocity`, held for `held_s`.
+// The peak and the loudness are of the phrase. All other figures are of one note at
+// `note_velocity`, held for `held_s`.
 struct PresetFigures {
   double peak_dbfs = silence_db;
   double loudness_lufs = silence_db;

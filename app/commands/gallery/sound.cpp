@@ -93,7 +93,7 @@ std::optional<double> t60_s(const Sound& sound, Stretch stretch) {
   const auto last =
       std::find_if(first, levels.end(), [&](double db) { return db < *first - fitted_db; });
   const auto count = static_cast<double>(last - first);
-  if (count < 2.0) {  // gone within a window
+  if (count < 2.0) {  // the sound ends within one window
     return last == levels.end() ? std::nullopt : std::optional(60.0 * step_s / fitted_db);
   }
   double t = 0.0, y = 0.0, tt = 0.0, ty = 0.0;

@@ -10,9 +10,9 @@ namespace ressort::commands {
 
 inline constexpr std::size_t most_drawn_modes = 48;
 
-// The lowest modes side by side. Meshes, and masses with a place in the model's drawing, are seen
-// from above: red is up, blue is down, and the area of a dot shows the displacement. All other
-// networks are drawn as lines, mass by mass. `network` is the model as it is written.
+// Draws the lowest modes side by side. Meshes, and masses with a place in the model's drawing, are
+// seen from above: red is up, blue is down, and the area of a dot shows the displacement. All other
+// networks are drawn as lines, mass by mass. `network` is the network as written.
 plot::Figure network_shapes_figure(const NetworkModes& modes, const Network& network,
                                    const std::string& title);
 

@@ -16,7 +16,7 @@ struct KeptStage {
   std::vector<Cable> cables;
 };
 
-// Writes the state and then replaces the previous one. Blocks on the disk.
+// Writes the state, and replaces the previous one when the new one is complete. Blocks on the disk.
 Result<Done> keep_stage(const std::string& folder, Session& session,
                         const std::vector<Cable>& cables);
 

@@ -150,7 +150,7 @@ class Player {
 
   ~Player() {
     if (session_) {
-      session_->end();  // wakes commands that wait for a load
+      session_->end();  // wakes commands that are waiting for a load
     }
     voice_.set_terminal(nullptr);
     terminal_.reset();
@@ -513,7 +513,7 @@ class Player {
     return exit_code::done;
   }
 
-  // After a MIDI file: true after half a second of silence, or after a minute.
+  // After a MIDI file: returns true after half a second of silence, or after a minute.
   bool has_fallen_silent() {
     constexpr double quiet_db = -80.0;
     const auto now = std::chrono::steady_clock::now();

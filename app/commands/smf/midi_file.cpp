@@ -13,7 +13,7 @@ using Bytes = std::span<const std::uint8_t>;
 
 constexpr double longest_s = 24.0 * 3600.0;
 
-// A parsed event. `count` of a tempo is the length of a quarter note in microseconds.
+// A parsed event. For a tempo, `count` is the length of a quarter note in microseconds.
 struct TrackEvent {
   enum class Kind : std::uint8_t { message, tempo, end };
   std::uint64_t tick = 0;

@@ -12,7 +12,8 @@ constexpr double floor_db = -100.0;
 constexpr std::size_t most_points = 2000;  // of a curve over time
 constexpr double pixels = 1700.0;          // of a curve over frequency
 
-// A frequency that is drawn over time, in a dash type of its own so that grey print is enough.
+// A frequency that is drawn over time. Each has its own dash pattern, so that grey print is
+// legible.
 struct TimeCurve {
   const char* figure;
   const char* title;
@@ -39,7 +40,7 @@ std::vector<double> levels_db(const Description& description, SpectrumKind kind)
   return levels;
 }
 
-// Spectra with many bins a pixel keep the strongest of each pixel.
+// Returns the rows of a spectrum. If a pixel covers many bins, the strongest one is kept.
 std::string spectrum_rows(const Description& description, SpectrumKind kind) {
   const std::vector<double> levels = levels_db(description, kind);
   const double pixel = std::log(highest_hz(description) / lowest_hz) / pixels;

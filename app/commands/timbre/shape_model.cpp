@@ -30,14 +30,14 @@ using json = nlohmann::ordered_json;
 constexpr int usual_key = 57;
 constexpr double near_f0 = 0.03;  // tolerance of the mode at the pitch
 
-// Targets taken from a sound file.
+// Targets that a sound file sets.
 struct Liked {
   std::vector<TimbreTarget> targets;
   std::optional<double> f0_hz;
   double rate_hz = 0.0;
 };
 
-// Figures of the loudest frame; a model is described by the first frame after a strike.
+// Returns the figures of the loudest frame. A model is described by the first frame after a strike.
 Result<Liked> liked(const std::string& path, const Progress& progress,
                     const std::function<bool()>& goes_on) {
   const auto sound = describe_sound(path, {}, [&](double) { return goes_on(); });

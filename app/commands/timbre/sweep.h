@@ -32,9 +32,8 @@ struct SweepTable {
 // empty.
 std::string to_csv(const SweepTable& table, const std::vector<SweptParameter>& swept);
 
-// Draws a panel for each figure over the parameter that is swept first, with a line for each value
-// of the others and dashed lines for laws. Fails on an unknown figure and on a law that is no
-// formula.
+// Draws a panel for each figure over the first swept parameter, with one line for each value of the
+// others and dashed lines for laws. Fails on an unknown figure and on a law that is not a formula.
 Result<plot::Figure> sweep_figure(const SweepTable& table, const DescribeOptions& options);
 
 // Analyses a sound for each combination of values. Prints equal warnings once. Sounds that cannot

@@ -14,7 +14,7 @@ namespace {
 const char* const usual_figures[] = {"centroid_hz", "spread_hz", "skewness",
                                      "kurtosis",    "decrease",  "rolloff95_hz"};
 
-// The later a line, the darker its grey; 0..1.
+// Returns a grey level, 0..1: later lines are darker.
 std::string grey(double share) {
   char text[16];
   const int level = static_cast<int>(std::lround(170.0 - 140.0 * share));
@@ -88,7 +88,7 @@ class SweepDrawer {
     return panel(words_of(figure) + unit_of(figure), curves);
   }
 
-  // By how many percent a law exceeds what was measured.
+  // Returns the panel of the percentage by which a law exceeds the measured values.
   plot::Panel deviation_panel(const LawCurve& law) const {
     const RowValue deviation = [&](const SweepRow& row) {
       const std::optional<double> found = row.figures[law.figure];

@@ -171,7 +171,7 @@ void answer::describe(const Question& question) {
         .real(info.safe.lowest)
         .real(info.safe.highest);
   }
-  std::set<std::string_view> customs;  // One address may drive several things.
+  std::set<std::string_view> customs;  // One address may control several targets.
   for (const CustomInfo& custom : loaded->instrument.custom) {
     if (customs.insert(custom.address).second) {
       row(custom.address, "f", "control of the preset, 0-1");

@@ -40,8 +40,8 @@ void tune(const Question& question);
 // differences, or /fail s:address s:reason, later from the session's worker.
 void shape(const Question& question);
 
-// Reply /subscribe.reply f:seconds, and then the messages of Subscribers; /done s:address or an
-// error.
+// Reply /subscribe.reply f:seconds, followed by the messages of Subscribers, or /done s:address, or
+// an error.
 void subscribe(const Question& question);
 void unsubscribe(const Question& question);
 

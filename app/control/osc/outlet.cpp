@@ -92,7 +92,7 @@ void OscOutlet::send(const OscSender& to, const Bytes& bytes) {
   address.sin_family = AF_INET;
   address.sin_addr.s_addr = htonl(to.address);
   address.sin_port = htons(to.port);
-  // Errors are ignored: the client is gone, and UDP guarantees nothing.
+  // Errors are ignored: the client is gone, and UDP does not guarantee delivery.
   sendto(socket_, bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&address),
          sizeof address);
 }

@@ -1,5 +1,5 @@
-// app/control: sends OSC replies. It lives as long as somebody may have to reply, since a load may
-// end after the server has.
+// app/control: sends OSC replies. It lives as long as any reply may be sent, because a load may end
+// after the server has.
 #pragma once
 
 #include <cstdint>

@@ -53,7 +53,7 @@ Fault take_blob(Bytes& left) {
   if (left.size() < 4) {
     return Error{"a blob's size is missing"};
   }
-  // A negative size reads as a huge one.
+  // A negative size becomes a huge unsigned one.
   const std::size_t size = read_u32(left);
   left = left.subspan(4);
   if (size > left.size() || padded(size) > left.size()) {

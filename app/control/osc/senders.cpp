@@ -53,8 +53,8 @@ bool contains(const Subnet& subnet, std::uint32_t address) {
 
 constexpr std::uint64_t all_others = ~std::uint64_t{0};
 
-// On this machine the port identifies the receiver. Remote ports are ignored, because a client with
-// a forged address could name any port.
+// On this machine the port identifies the client. Remote ports are ignored, because a client with a
+// forged address could use any port.
 std::uint64_t key_of(const OscSender& sender) {
   return std::uint64_t{sender.address} << 16 | (is_this_machine(sender.address) ? sender.port : 0u);
 }

@@ -1,5 +1,5 @@
-// app/control: decides who may send OSC and how much is sent in reply. Pure: works on addresses,
-// sizes and times.
+// app/control: decides who may send OSC and how many bytes are sent in reply. Pure: works on
+// addresses, sizes and times.
 #pragma once
 
 #include <cstddef>
@@ -51,7 +51,7 @@ class AnswerBudget {
   bool may_answer(const OscSender& to, std::int64_t now_ns);
   void answered(const OscSender& to, std::size_t bytes, std::int64_t now_ns);
 
-  // Returns the time until replies resume; 0 if the client was told so already.
+  // Returns the time until replies resume; 0 if the client has already been told.
   double tell_pause_s(const OscSender& to, std::int64_t now_ns);
 
   std::size_t senders() const { return accounts_.size(); }

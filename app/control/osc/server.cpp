@@ -216,7 +216,7 @@ struct OscServer::Server {
     TimedEvent timed;
     if (time_tag > 1) {
       const ClockReading clock = process.clock.read();
-      // A block that ended long ago does not predict the next one.
+      // A block that ended long ago does not predict the next one's time.
       if (clock.rate_hz <= 0.0 || monotonic_ns() - clock.time_ns > second_ns) {
         client.error(group.address, "no audio is running: time tags cannot be converted to frames");
         return;
@@ -231,8 +231,8 @@ struct OscServer::Server {
       }
       timed.timing = TimedEvent::When::at_frame;
       timed.when = tags.frame(time_tag, clock);
-      // The newest block already has its events, so a late one starts with the next block and
-      // counts as late.
+      // The newest block already has its events, so a late event acts at the start of the next
+      // block and counts as late.
       late_s = static_cast<double>(clock.frame + clock.period - timed.when) / clock.rate_hz;
     }
     for (TimedEvent& event : group.events) {

@@ -22,7 +22,7 @@ struct OscOptions {
 // and none is named, returns an error that explains how.
 Result<std::vector<Subnet>> allowed_senders(const OscOptions& options);
 
-// open_osc_socket() fails if the port is in use or the address does not belong to this machine.
+// open_osc_socket() fails if the port is in use or if the address does not belong to this machine.
 Result<int> open_osc_socket(const OscOptions& options);
 int port_of(int socket);
 

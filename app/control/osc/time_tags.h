@@ -12,11 +12,11 @@ inline constexpr double tag_horizon_s = 10.0;  // Events farther ahead are rejec
 // Returns the seconds between two tags; tags wrap around in 2036.
 double seconds_between(std::uint64_t from, std::uint64_t to);
 
-// Converts time tags to frames. The clock reading of each block has jitter, so tags are counted
+// Converts time tags to frames. The clock reading of each block has jitter, so frames are counted
 // from one anchor: equal distances of tags are equal distances of frames, whatever later readings
-// say. The anchor is a whole frame at its own tag, so that tags whole frames apart stay away from
-// the rounding boundary. It is dropped when it is off by 10 ms, because the sound card's clock
-// drifts or has stopped, and after a pause.
+// say. The anchor is a whole frame at its own tag, so that tags that are whole frames apart stay
+// away from the rounding boundary. The anchor is dropped after a pause, and when it is off by 10
+// ms, because the sound card's clock drifts or has stopped.
 class TagClock {
  public:
   TagClock();

@@ -35,7 +35,7 @@ class FlightRecorder {
   Result<std::string> save(const std::string& name);
 
  private:
-  // With the lock held:
+  // Callers hold the lock.
   void read_records();
   bool has_begun() const;  // true once an engine has played
   // Returns the flight so far, or an error before the first engine and beyond the limits.

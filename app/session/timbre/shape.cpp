@@ -216,7 +216,7 @@ Result<Shaped> shape_timbre(const ShapeRequest& request, std::vector<TimbreTarge
                                             : Error{scene.name + ": " + found.error().message};
   }
   shaped.found = *std::move(found);
-  if (!options.has_attack) {  // shown even if it is no target
+  if (!options.has_attack) {  // printed even if it is not a target
     const auto attack = static_cast<std::size_t>(AskedFigure::attack);
     shaped.found.before[attack] = model.attack_ms(request.values);
     shaped.found.reached[attack] = model.attack_ms(shaped.found.values);

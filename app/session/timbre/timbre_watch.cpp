@@ -80,7 +80,7 @@ void TimbreWatch::work() {
   }
 }
 
-// Analyses the output until nobody listens or the rate changes.
+// Analyses the output until no client listens or the rate changes.
 void TimbreWatch::hear() {
   const double rate_hz = process_.clock.read().rate_hz;
   RecordedChunk chunk;

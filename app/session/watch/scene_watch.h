@@ -40,7 +40,7 @@ class SceneWatch {
 
  private:
   std::optional<FileWatch> watch_;
-  bool was_edited_ = false;  // before the watch began
+  bool was_edited_ = false;  // a change before the watch began
   std::optional<Scene> as_read_;
   mutable std::mutex mutex_;  // guards reload_
   Reload reload_;
