@@ -208,7 +208,7 @@ TEST_CASE("the chart has every controller with a fixed meaning", "[midi]") {
                                channels.softness(0),
                                channels.glide_s(0, 1.0),
                                channels.sustains(0) ? 1.0 : 0.0,
-                               channels.holds(0) ? 1.0 : 0.0,
+                               channels.latches(0) ? 1.0 : 0.0,
                                channels.is_legato(0) ? 1.0 : 0.0,
                                channels.semitones(0)};
   };
