@@ -19,10 +19,10 @@ struct RenderOptions {
   std::string name;    // model or preset
   std::string output;  // sound file; the extension selects the format
   double rate_hz = 44100.0;
-  // at most one of the next two; default: the length of the score, or of
+  // At most one of the next two. Default: the length of the score, or of the input and two seconds
+  // of decay, or of the MIDI file and its decay, at most a minute.
   std::optional<double> seconds;
-  std::optional<long long> frames;  //   the input and two seconds of decay, or of the MIDI file
-                                    //   and its decay, at most a minute
+  std::optional<long long> frames;
   std::string input;                // sound file; channel N drives input N
   std::string score;                // score file
   std::string midi;                 // Standard MIDI File, in addition to the score

@@ -1,4 +1,4 @@
-// The edge bound on the stiffness factor, linear in time and memory for every network.
+// The edge bound on the stiffness factor, computed in linear time and memory for every network.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -77,8 +77,9 @@ class NetworkBound {
     });
   }
 
-  // Returns the displacement of a place when no node around it moves farther than 1. On a body it
-  // may exceed 1. A link at such a place counts as a link at a node, scaled by that displacement.
+  // Returns the displacement of a place when no node around it moves farther than 1. On a body the
+  // displacement may exceed 1. A link at such a place counts as a link at a node, scaled by that
+  // displacement.
   double way_of(std::uint32_t end) const {
     const Mass& mass = network_.masses[end];
     if (mass.kind != MassKind::point || network_.taps[mass.tap].places == 0) {

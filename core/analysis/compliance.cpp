@@ -34,9 +34,9 @@ class Anchors {
   std::uint32_t ground_;  // Stands for everything that does not move.
 };
 
-// Returns the network without links that can let go, since these hold nothing; many of them may be
-// at one moving place, each with a term at every node under it. Links whose stiffness can be
-// negative stay, and make the caller refuse.
+// Returns the network without links that can detach, since these hold no mass at rest. Many of them
+// may be at one moving place, each with a term at every node under it. Links whose stiffness can be
+// negative stay, and the caller then reports that no compliance is known.
 Network always_touching(const Network& network, std::span<const Range> arguments,
                         double rate_ratio) {
   Network felt = network;

@@ -84,9 +84,9 @@ bool Definite::factor(std::span<const double> diagonal, std::span<const double> 
 
 // Let A be the matrix without the moving terms. Then A - sum w g g^T is positive definite if the
 // matrix of sqrt(w_i w_j) g_i^T A^-1 g_j has a norm below 1 (Schur complement). Let c be the
-// largest g^T A^-1 g over all positions of an end, those between two nodes included. Every
-// |g_i^T A^-1 g_j| is at most sqrt(c_i c_j), and it is 0 between parts, so the norm is at most the
-// largest sum of w c within a part.
+// largest g^T A^-1 g over all positions of an end, including those between two nodes. Every |g_i^T
+// A^-1 g_j| is at most sqrt(c_i c_j), and it is 0 between parts, so the norm is at most the largest
+// sum of w c within a part.
 Definite::Wandering Definite::wander(std::span<const double> diagonal,
                                      std::span<const double> weights) {
   constexpr double infinity = std::numeric_limits<double>::infinity();

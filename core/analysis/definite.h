@@ -23,8 +23,8 @@ class Definite {
   // randomly connected rows. If false, no other member may be called.
   bool is_feasible();
 
-  // Returns whether the matrix with D by row and w by term is positive definite. [any thread but
-  // audio]
+  // Factors the matrix with D by row and w by term. Returns whether it is positive definite. [any
+  // thread but audio]
   bool factor(std::span<const double> diagonal, std::span<const double> weights);
 
   // Tests the matrix with each moving end at one node at a time instead of at all of them. It is

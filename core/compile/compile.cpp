@@ -40,8 +40,9 @@ Promise make_promise(const CompileRequest& request, const Analysis& analysis, co
   return promise;
 }
 
-// Returns the factor on every stiffness that the highest key asks for: the factor of exact modes if
-// the published scheme cannot reach that key; otherwise `stable`, the factor that it bears.
+// Returns the factor on every stiffness that the highest key requires: the factor of exact modes if
+// the published scheme cannot reach that key, otherwise `stable`, which is the highest stable
+// factor.
 double wanted_factor(const CompileRequest& request, const Mode& mode, double stable) {
   constexpr int highest_of_a_piano = 108;
   constexpr double highest_share = 0.45;  // of the sample rate
@@ -56,7 +57,8 @@ double wanted_factor(const CompileRequest& request, const Mode& mode, double sta
   const double angle =
       2.0 * std::numbers::pi * std::min(hz / request.options.rate_hz, highest_share);
   const double stiffness = mode.stiffness * request.rate_ratio * request.rate_ratio;
-  // The published scheme sounds a mode at K/M = (2 sin(angle / 2))^2, exact modes at angle^2.
+  // The published scheme plays a mode of K/M = (2 sin(angle / 2))^2 at this angle per sample, and
+  // exact modes one of angle^2.
   const double swing = 2.0 * std::sin(0.5 * angle);
   return swing * swing / stiffness <= stable ? stable : angle * angle / stiffness;
 }
@@ -87,7 +89,7 @@ Planned plan(const CompileRequest& request, const Analysis& analysis, const Proo
 
 struct BowCheck {
   std::optional<Error> error;  // a bow that is too strong at the start values
-  std::string note;            // the pitch above which the strongest bow may be
+  std::string note;  // the pitch above which the strongest bow is too strong
 };
 BowCheck check_bows(const CompileRequest& request, const Network& network, const Schemes& schemes,
                     const Analysis& analysis, const Proof& proof, const Machine& machine,
@@ -126,7 +128,7 @@ std::string reason_without_mode(const Network& network, const Preset& preset) {
   return preset.pitch_mode > 1 ? "there is no mode " + std::to_string(preset.pitch_mode) : "";
 }
 
-// Returns what a person should know about the way the network is computed, besides its parts.
+// Returns the notes about the computation of the network that are not about a single part.
 std::vector<std::string> make_notes(const CompileRequest& request, const Reduced& reduced,
                                     const Schemes& schemes, const Culled& culled,
                                     const Proof& proof, const TunedKeys& keys, bool misses_gain,
@@ -241,7 +243,8 @@ Result<Compiled> compile_network(const Network& network, const Preset& preset,
     if (touched.outputs.empty()) {
       return compile_by_stages({written, preset, options});
     }
-    // Ranges in swings are measured first, by a loud note heard at the masses that are touched.
+    // Ranges in swings are resolved first: a loud note is played, and its displacement is measured
+    // at the masses that the controls touch.
     CompileOptions one = options;
     one.voices = 1;
     one.find_gain = true;

@@ -45,8 +45,8 @@ void join_places(const Network& network, Groups& groups, const Progress& progres
 }
 
 // Elements to leave out: connected components without an output, and links without strength.
-// Grounds and position inputs connect nothing, because no motion passes through them. Components
-// without an input stay, because their masses may be struck (core/engine/struck.h).
+// Grounds and position inputs connect no components, because no motion passes through them.
+// Components without an input stay, because their masses may be struck (core/engine/struck.h).
 struct Culled {
   std::vector<bool> is_dead;   // [mass of any kind]
   std::vector<bool> is_slack;  // [link] has no strength, or acts on dead masses only
@@ -57,7 +57,7 @@ struct Culled {
 // For networks without macros. O(n). [any thread but audio]
 Culled cull(const Network& network, const Progress& progress = {});
 
-// Returns "12 masses that no output hears, 1 link without strength"; empty if nothing is left out.
+// Returns "12 masses that no output hears, 1 link without strength"; empty if every element stays.
 std::string describe(const Culled& culled);
 
 }  // namespace ressort::compile

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::uint32_t nowhere = 0xffffffffu;
 
-// The elements of a network that go into one Program, in the network's order.
+// The elements of a network that form one Program, in the network's order.
 struct Share {
   std::vector<std::uint32_t> masses;
   std::vector<std::uint32_t> links;
@@ -314,8 +314,8 @@ class ProgramMaker {
   std::map<CoefficientKey, std::uint32_t> known_;
 };
 
-// Divides a culled network into connected components. Grounds connect nothing, except grounds with
-// an output.
+// Divides a culled network into connected components. Grounds connect no components, except grounds
+// with an output.
 class Divider {
  public:
   Divider(const Network& network, const Culled& culled, const Progress& progress)

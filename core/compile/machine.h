@@ -26,16 +26,17 @@ inline double rate_ratio_of(double rate_hz, bool rescale) {
 }
 
 // Returns the network without culled elements, divided into its connected components, the largest
-// first, each in the direct form. For networks without macros. `schemes`: [link]; empty: all as
-// published. `start`: [parameter] initial values of the voices. O(n log n). [any thread but audio]
+// first, each in the direct form. For networks without macros. `schemes`: [link]; empty: the
+// published scheme for all. `start`: [parameter] initial values of the voices. O(n log n). [any
+// thread but audio]
 Machine tabulate(const Network& network, const Culled& culled, std::span<const LinkScheme> schemes,
                  std::span<const double> start, double rate_hz, bool rescale,
                  const Progress& progress = {});
 
-// Returns the tables of a network with its macros, culled and with all links as published.
+// Returns the tables of a network with its macros, culled, with the published scheme for all links.
 Machine make_machine(const Network& network, double rate_hz, bool rescale);
 
-// Returns the tables of a network with its macros as one part, with nothing culled.
+// Returns the tables of a network with its macros as one part, without culling.
 Program make_program(const Network& network, double rate_hz, bool rescale,
                      std::span<const LinkScheme> schemes = {});
 

@@ -67,7 +67,8 @@ std::optional<double> find_gain(const Machine& machine, const Playing& playing, 
   constexpr double most_steps = 4e6;
   constexpr double most_steps_at_worst = 1e9;
   constexpr double most_steps_of_block = 4e6;
-  constexpr double steps_of_shared_link = 200.0;  // passive ones are solved together, by Newton
+  // Passive links are solved together by Newton's method.
+  constexpr double steps_of_shared_link = 200.0;
   double steps = 1.0;                             // of a sample
   double at_worst = 1.0;
   for (const Program& program : machine.parts) {

@@ -25,9 +25,8 @@ std::optional<Error> check_memory(const Machine& machine, int voices, Precision 
 inline constexpr double found_gain_peak = 0.5;
 
 // Plays a forte note and returns the gain at which it peaks at -6 dBFS. `playing`: one voice at
-// gain
-// 1. Returns 1 if the note makes no sound. Plays about 4 million steps of a mass; returns nothing
-// if even the first 50 ms could take seconds. [any thread but audio]
+// gain 1. Returns 1 if the note makes no sound. Plays about 4 million steps of a mass; returns
+// nothing if even the first 50 ms could take seconds. [any thread but audio]
 std::optional<double> find_gain(const Machine& machine, const Playing& playing, Precision precision,
                                 Isa isa, const Progress& progress);
 

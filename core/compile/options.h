@@ -1,4 +1,4 @@
-// core/compile: the inputs of one compilation, which every stage reads and none changes.
+// core/compile: the inputs of one compilation. Every stage reads them and none changes them.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +19,8 @@ namespace ressort::compile {
 
 struct CompileOptions {
   double rate_hz = 44100.0;
-  bool rescale = true;    // the model's numbers are meant at 44,100 Hz: keep pitch and decay
-  bool bare = false;      // no smoothing and no sleep: the network as it is written
+  bool rescale = true;  // keeps pitch and decay at other rates than the model's 44,100 Hz
+  bool bare = false;  // the network as written: no smoothing and no sleep
   int voices = 0;         // replaces the preset's number; 0: the preset's
   NoteShare::Part share;  // share of the notes that this engine plays
   Precision precision = Precision::float64;
@@ -29,7 +29,7 @@ struct CompileOptions {
   Isa isa = best_isa();          // no wider than the machine's
   std::uint32_t most_modes = patient_modes;  // masses of a part up to which modes are computed
   const Timings* timings = nullptr;          // for the plan; null: the same forms on every machine
-  std::vector<std::string> forms;            // of an earlier plan, which is repeated; see Choice
+  std::vector<std::string> forms;  // forms of an earlier plan, which is repeated; see Choice
   Executor* executor = nullptr;              // helper threads; outlives the engine; null: none
   bool find_gain = false;         // choose the gain so that a forte note peaks at -6 dBFS
   bool force = false;             // do not narrow ranges to stable values

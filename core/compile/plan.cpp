@@ -12,8 +12,10 @@ namespace ressort::compile {
 namespace {
 
 constexpr std::uint32_t most_steps_to_reach = 8;
-constexpr double most_behind = 4.0;  // times the best estimate: a form beyond that is not measured
-constexpr double least_gain = 1.0 / 0.9;  // for which the first in rank is given up
+// ratio to the best estimate beyond which a form is not measured
+constexpr double most_behind = 4.0;
+// speed-up for which the form that ranks first is replaced
+constexpr double least_gain = 1.0 / 0.9;
 
 std::string in_ns(double ns) {
   char text[32];
@@ -40,7 +42,7 @@ std::string describe(const Accuracy& accuracy) {
 
 class Chooser {
  public:
-  // `recorded`: the name of the form to take; empty: the choice is free.
+  // `recorded`: the name of the required form; empty: the choice is free.
   Chooser(Program& program, const Workload& load, std::uint32_t most_modes, const Budget& budget,
           const Progress& progress, const Timings* timings = nullptr, std::string recorded = {})
       : program_(program),
@@ -52,7 +54,7 @@ class Chooser {
         eigenvectors_of_(most_tied_masses(program)),
         budget_(budget) {}
 
-  // Chooses a form that keeps what is left of a budget of pitch and decay.
+  // Chooses a form that keeps the remaining budget of pitch and decay.
   Part choose(Judge& judge, const Accuracy& spent) {
     spent_ = spent;
     judge_ = &judge;
@@ -85,8 +87,8 @@ class Chooser {
   std::optional<Part> reach(Judge* judge, const Accuracy& spent) {
     spent_ = spent;
     judge_ = judge;
-    // Modes contain only the linear part of a nonlinear spring; the rest is as published, and so is
-    // its limit of stability.
+    // Modes contain only the linear part of a nonlinear spring. The rest uses the published scheme,
+    // so its stability limit applies.
     if (eigenvectors_of_ <= most_modes_ && !contains_bent_springs(program_)) {
       consider(Method::modal);
     }
@@ -95,7 +97,7 @@ class Chooser {
     if (program_.modes.empty() && times <= most_steps_to_reach && !may_gain_) {
       add_steps(times, load_at_steps());
     }
-    // One voice must be affordable. How many are is found out while playing.
+    // One voice must be affordable. The number of affordable voices is found while playing.
     if (candidates_.empty() ||
         nominal_ns * candidates_[best_].operations > 0.5e9 / program_.rate_hz * load_.voices) {
       return std::nullopt;
@@ -120,8 +122,8 @@ class Chooser {
     Form form;
     std::string name;
     double operations;
-    std::optional<Accuracy> of_form;  // alone
-    Accuracy accuracy;                // with what was spent before
+    std::optional<Accuracy> of_form;  // error of this form alone
+    Accuracy accuracy;  // including the error of the parts before
     std::optional<double> measured_ns = {};
   };
 
@@ -156,7 +158,7 @@ class Chooser {
     }
     consider(Method::direct);
     if (program_.moving == 0 || !program_.modes.empty()) {
-      return;  // more steps bring a body's modes nowhere nearer
+      return;  // More steps do not improve a body's modes.
     }
     for (std::uint32_t times = 2; times <= most_oversampling; times *= 2) {
       if (consider_steps(times)) {
@@ -177,8 +179,8 @@ class Chooser {
     return candidates_.back().accuracy.meets(budget_);
   }
 
-  // Adds `times` steps a sample in every published form that may be the cheapest of them. All of
-  // them have the same accuracy.
+  // Adds `times` steps a sample in every published form that may be the cheapest. All of them have
+  // the same accuracy.
   void add_steps(std::uint32_t times, const Workload& load, std::optional<Accuracy> accuracy = {}) {
     Program fine = oversampled_program(program_, times);
     Chooser chooser(fine, load, 0, {}, progress_);
@@ -193,10 +195,10 @@ class Chooser {
     }
   }
 
-  // Returns whether another form than the first in rank may be taken.
+  // Returns whether a form other than the first in rank may be chosen.
   bool is_open() const { return timings_ != nullptr || !recorded_.empty(); }
 
-  // Modes below the budget of silence are not stepped, on average half of them.
+  // Modes below the budget of silence are not stepped; on average these are half of them.
   double weight_of(Method method) const {
     return method == Method::modal && budget_.silence_db > -Budget::unlimited ? 0.5 : 1.0;
   }
@@ -233,8 +235,7 @@ class Chooser {
     return weight_of(c.method) * (c.measured_ns ? *c.measured_ns : c.operations);
   }
 
-  // Ranks by excess, then by cost. Of forms whose error is not known, the published scheme is
-  // first.
+  // Ranks by excess, then by cost. Among forms with unknown error, the published scheme is first.
   bool is_better(const Candidate& a, const Candidate& b) const {
     const bool is_published = a.method == Method::direct;
     if (judge_ != nullptr && !a.accuracy.is_known && !b.accuracy.is_known &&
@@ -260,7 +261,7 @@ class Chooser {
   }
 
   // Returns the candidates that may be the cheapest: those that keep the budget as well as the best
-  // does, and whose estimates are near to its.
+  // candidate and have estimates close to the best.
   std::vector<std::size_t> leading() const {
     std::vector<std::size_t> found;
     const Candidate& best = candidates_[best_];
@@ -275,8 +276,8 @@ class Chooser {
     return found;
   }
 
-  // Replaces the first in rank by the form that an earlier plan had, or by one that is measured to
-  // be clearly cheaper.
+  // Replaces the first in rank by the form of an earlier plan, or by a form that is measured to be
+  // clearly cheaper.
   void settle() {
     const auto recorded =
         std::find_if(candidates_.begin(), candidates_.end(),
@@ -313,8 +314,8 @@ class Chooser {
     }
   }
 
-  // Says how the others compare with the chosen form: in ns if they were measured with it, else in
-  // operations.
+  // Describes how the other forms compare with the chosen one: in ns if they were measured
+  // together, otherwise in operations.
   std::string comparison() const {
     const Candidate& best = candidates_[best_];
     std::string text;

@@ -9,7 +9,7 @@
 namespace ressort::compile {
 namespace {
 
-constexpr std::size_t most_places = 64;  // each takes a solution of the linear system
+constexpr std::size_t most_places = 64;  // Each place takes a solution of the linear system.
 
 }  // namespace
 

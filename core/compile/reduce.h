@@ -11,7 +11,7 @@ namespace ressort::compile {
 
 struct Reduced {
   Network network;                 // without macros
-  std::size_t merged_springs = 0;  // springs whose stiffness and damping another one took over
+  std::size_t merged_springs = 0;  // number of springs that were merged into another one
 };
 
 // Returns the network to play. A bare network without a budget is not merged. O(n).

@@ -160,7 +160,7 @@ class StabilityChecker {
       box_ = std::move(wide);
       return;
     }
-    // The same share for all, found by bisection; then each parameter takes the room that is left.
+    // Finds the largest share for all by bisection; then each parameter takes the remaining room.
     const double share = stability_.share(box_, wide);
     ParameterBox shared = box_;
     for (const std::size_t i : which) {
@@ -181,9 +181,9 @@ class StabilityChecker {
     box_ = std::move(shared);
   }
 
-  // Audio inputs get the room that other parameters leave. If these took it all, their ranges
+  // Gives audio inputs the room that other parameters leave. If these leave none, their ranges
   // shrink by a tenth, provided that an audio range grows tenfold by that. Audio must not make a
-  // stiffness, damping or mass negative that is not so at the start.
+  // stiffness, damping or mass negative that is not negative at the start.
   void widen_audio() {
     constexpr double knobs_share = 0.9;
     constexpr double least_growth = 10.0;
@@ -331,7 +331,7 @@ class StabilityChecker {
   void report_range(std::size_t i) {
     ParameterInfo& info = result_.parameters[i];
     if (is_audio(i) && box_.lowest[i] == box_.highest[i]) {
-      return;  // nothing is proved; an audio input without a range would be useless
+      return;  // Nothing is proved, and an audio input without a range would be useless.
     }
     if (const auto safe = request_.bare || result_.is_together
                               ? std::nullopt

@@ -19,7 +19,7 @@ struct FoundPitches {
   bool ignores_springs = false;  // tuned as if nothing were attached to the waveguide
 };
 
-// Tunes the lowest mode at these values of the parameters.
+// Tunes keys to the lowest mode at these values of the parameters.
 FoundPitches find_pitches(const CompileRequest& request, const Network& network,
                           const Machine& machine, const LowestShapes& shapes,
                           std::span<const double> parameters) {
@@ -137,7 +137,7 @@ TunedKeys tune(const CompileRequest& request, const Network& network, const Anal
   keys.mode = analysis.mode();
   keys.mode->frequency_hz = keys.pitches.frequency_at(1.0);
   keys.along = find_pitches_along(request, network, planned.machine);
-  // The chosen forms bear more stiffness than the published scheme. Keys may use it up to the
+  // The chosen forms allow more stiffness than the published scheme. Keys may use it up to the
   // highest mode that is played.
   if (planned.more > 1.0) {
     const double highest = keys.pitches.factor_at(highest_mode_share * request.options.rate_hz);

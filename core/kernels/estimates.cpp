@@ -9,8 +9,9 @@
 namespace ressort::kernels {
 namespace {
 
-constexpr std::uint64_t numbers_of_node = 5;  // position, velocity, force, and a kernel's own
-constexpr std::uint64_t numbers_of_link = 1;  // for all voices of a kernel that has many
+// position, velocity, force and two numbers of the kernel
+constexpr std::uint64_t numbers_of_node = 5;
+constexpr std::uint64_t numbers_of_link = 1;  // per link, if a kernel has one number for all voices
 constexpr std::uint64_t bytes_of_link = 48;   // in tables
 constexpr std::uint64_t numbers_of_coefficient = 3;
 
@@ -29,7 +30,8 @@ LinkCount links_of(const Program& program) {
 }
 
 double passive_operations(const Program& program) {
-  constexpr double of_a_shared_link = 480.0;  // about three iterations of Newton's method
+  // operations of about three iterations of Newton's method
+  constexpr double of_a_shared_link = 480.0;
   constexpr double of_a_spring_in_web = 16.0;
   if (const std::size_t springs = springs_of_web(program); springs > 0) {
     double sum = of_a_spring_in_web * static_cast<double>(springs);

@@ -14,8 +14,8 @@ namespace ressort::kernels {
 
 class Executor;
 
-// ns per operation: a nominal figure for all machines, of which real ones may be two or three times
-// off in either direction. An operation is one instruction, on a whole vector or on one number.
+// ns per operation: a nominal value for all machines; real ones may be two or three times faster or
+// slower. An operation is one instruction, on a whole vector or on one number.
 inline constexpr double nominal_ns = 0.25;
 
 // The conditions that an estimate or a measurement is for.
@@ -23,10 +23,12 @@ struct Workload {
   bool is_double = true;
   Isa isa = Isa::base;
   int voices = 1;
-  double highest_factor = 1.0;   // on every stiffness, that the published scheme bears
-  double wanted_factor = 1.0;    // that keys ask for
-  double moving = 0.25;          // share of the samples in which some parameter moves
-  Executor* executor = nullptr;  // that large parts may be shared out to; null: one core for all
+  // the highest stable factor on every stiffness in the published scheme
+  double highest_factor = 1.0;
+  double wanted_factor = 1.0;  // the factor that keys require
+  double moving = 0.25;  // fraction of the samples in which any parameter moves
+  // executor among which large parts may be divided; null: one core for all
+  Executor* executor = nullptr;
   bool reaches_beyond() const { return wanted_factor > highest_factor; }
 };
 
@@ -53,8 +55,8 @@ inline double bytes_of_number(const Workload& load) {
 double lines_of(double bytes);
 double far_lines_of(double bytes);
 
-// Returns an upper bound on the steps of one voice per sample, with every iterative solve taking as
-// long as it may. It decides what is too large to try. O(runs)
+// Returns an upper bound on the steps of one voice per sample, with the most iterations for every
+// iterative solution. It shows which networks are too large to try. O(runs)
 double worst_steps(const Program& program);
 
 // Return the bytes of one voice: its nodes and coefficients alone, with one number per link if all

@@ -1,4 +1,4 @@
-// core/kernels: the tables that a kernel needs of a Program, of whatever kernel.
+// core/kernels: the tables that a kernel derives from a Program, for any kernel.
 #pragma once
 
 #include <concepts>
@@ -19,12 +19,12 @@ class Form {
     }
     tables_ = std::make_shared<const Tables>(std::move(tables));
   }
-  // Without moves: a Program whose form was moved away still has its tables.
+  // No move operations: a Program whose form was moved away still has its tables.
   Form(const Form&) = default;
   Form& operator=(const Form&) = default;
   ~Form() = default;
 
-  // Null if the tables are another kernel's.
+  // Returns null if the tables belong to another kernel.
   template <class Tables>
   const Tables* get_if() const {
     return is<Tables>() ? static_cast<const Tables*>(tables_.get()) : nullptr;

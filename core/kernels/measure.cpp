@@ -21,7 +21,7 @@ constexpr std::size_t most_blocks = 15;
 constexpr double enough_ns = 3e6;   // for all blocks of one form
 constexpr double most_steps = 1e6;  // of all voices in a sample: larger parts are not measured
 
-// A part in one form with the state and the input that its worst case needs.
+// A part in one form, with the state and the input of its worst case.
 template <class T>
 class Trial {
  public:
@@ -47,8 +47,8 @@ class Trial {
     outputs_.resize(max_block_frames * width * program.outputs.size());
   }
 
-  // Puts all voices where every link that can touch touches. A part in which nothing was open keeps
-  // ringing instead.
+  // Moves all voices to positions where every link that can touch touches. A part in which no gap
+  // was open keeps ringing instead.
   void start() {
     if (has_started_ && !has_closed_) {
       return;
@@ -81,8 +81,8 @@ class Trial {
     });
   }
 
-  // Moves an end of each open contact, pluck or the like to a quarter of its reach from the other:
-  // a hand if the link has one, else a mass.
+  // Moves one end of each open contact, pluck and the like to a quarter of its reach from the other
+  // end: a position input if the link has one, else a mass.
   void close_gaps() {
     for (const LinkRun& run : program_.link_runs) {
       const LawFacts& law = facts_of(run.law);
@@ -110,7 +110,7 @@ class Trial {
     }
   }
 
-  // Hands stay where they touch; forces are noise, so that all modes ring.
+  // Position inputs stay where they touch. Force inputs are noise, so that all modes ring.
   void set_inputs(std::size_t width) {
     value_.resize(max_block_frames * width * program_.inputs.size());
     velocity_.resize(value_.size());

@@ -1,5 +1,5 @@
-// core/kernels: how long a part takes in one of its forms on this machine. The clock and the store
-// of earlier results are functions of the application: this room has neither clocks nor files.
+// core/kernels: measures the time of a part in one of its forms on this machine. The application
+// supplies the clock and the store of earlier results: this room uses neither clocks nor files.
 #pragma once
 
 #include <functional>
@@ -11,12 +11,12 @@
 
 namespace ressort::kernels {
 
-// Measures forms and remembers what they took. Every function may be empty.
+// Measures forms and keeps the results. Every function may be empty.
 struct Timings {
   // Calls `play` once, with denormals flushed to zero, and returns the ns that it took. If it is
   // empty, nothing is measured.
   std::function<double(const Program& program, const std::function<void()>& play)> time;
-  // Returns the ns per sample that keep() was given for this key, perhaps in an earlier run.
+  // Returns the ns per sample that keep() received for this key, perhaps in an earlier run.
   std::function<std::optional<double>(const std::string& key)> recall;
   std::function<void(const std::string& key, double ns)> keep;
 };

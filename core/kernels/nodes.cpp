@@ -120,7 +120,7 @@ void NodeKernel<T>::set_state(std::size_t lane, const double* x, const double* v
 template <class T>
 bool NodeKernel<T>::save(std::size_t lane, double* x, double* v) const {
   if (!program_.waveguides.empty()) {
-    return false;  // nodes are not all that there is
+    return false;  // There are other states than those of nodes.
   }
   for (std::size_t node = 0; node < program_.position.size(); ++node) {
     x[node] = nodes_.position(node, lane);
@@ -184,7 +184,7 @@ std::size_t NodeKernel<T>::look(std::size_t lane, std::span<const std::uint32_t>
   return look_at(nodes, numbers, [&](std::uint32_t node) {
     const double x = nodes_.position(node, lane);
     return is_junction(program_, node) ? x - nodes_.velocity(node, lane) / 2
-                                       : x;  // as its outputs have it
+                                       : x;  // as in its outputs
   });
 }
 

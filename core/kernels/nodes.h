@@ -109,11 +109,11 @@ class NodeKernel : public Kernel<T> {
   Nodes<T> nodes_;
 
  private:
-  // Returns whether the nodes have the forces of the next sample already.
+  // Returns whether the kernel already has the forces of the next sample.
   virtual bool keeps_forces() const { return false; }
-  // Resets all that a lane has besides its nodes.
+  // Resets the state of a lane besides its nodes.
   virtual void clear(std::size_t) {}
-  // Returns whether that changes by less than `bound` per sample.
+  // Returns whether that state changes by less than `bound` per sample.
   virtual bool is_quiet(std::size_t, double) const { return true; }
 };
 

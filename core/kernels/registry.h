@@ -24,7 +24,7 @@ namespace ressort::kernels {
 // The kernels that can be asked for by name.
 enum class Method { direct, chains, modal, grid, batch, oversampled };
 
-// The inputs of the search for a kernel's tables.
+// The arguments of the search for a kernel's tables.
 struct KernelRequest {
   const Program& program;
   const Workload& load;
@@ -36,11 +36,11 @@ struct KernelRow {
   enum class Use {
     published,  // computes the published scheme, possibly in other coordinates
     physical,   // approximates the continuous network better, for a budget or by name
-    given,      // used for several cores; has no name of its own
+    given,  // divides other forms among several cores; has no name of its own
   };
 
   Form::Kind kind;  // of its tables
-  Method method;    // of a given one, the method of its parts
+  Method method;  // the method, or of a divided form the method of its parts
   std::string_view name;
   Use use;
   // Makes the tables of a Program; empty if the kernel cannot play it. [any thread but audio]
@@ -66,8 +66,8 @@ std::string removed_method_advice(std::string_view name);
 // Returns the methods of one use, the reference first.
 std::vector<Method> methods_for(KernelRow::Use use);
 
-// Returns the operations per sample of all voices in the Program's form, with everything that can
-// touch touching all the time: the worst case that a block's deadline has to allow for.
+// Returns the operations per sample of all voices in the Program's form, with all contacts closed
+// all the time: the worst case for a block's deadline.
 double operations(const Program& program, const Workload& load);
 
 // The same in ns, at nominal_ns each: a rough guide.

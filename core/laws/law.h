@@ -132,13 +132,13 @@ struct LawFacts {
     return i;
   }
   constexpr bool has(Role role) const { return slot(role) < count; }
-  // Returns true if the argument makes a force. Without any of these there is none.
+  // Returns true if the argument scales the force. If all of these are 0, the law exerts no force.
   constexpr bool is_strength(std::size_t i) const {
     return i < count && arguments[i].role != Role::reach && arguments[i].role != Role::shape;
   }
   // Returns true if the law has a stiffness and acts at every distance.
   constexpr bool is_spring() const { return zone == Zone::everywhere && !is_friction; }
-  // Returns true if distant ends do not feel each other.
+  // Returns true if the law exerts no force between distant ends.
   constexpr bool lets_go() const { return zone == Zone::near || zone == Zone::below; }
   // Returns true for a contact: it acts while b is below a.
   constexpr bool is_one_sided() const { return zone == Zone::below; }
@@ -170,8 +170,8 @@ Law law_named(std::string_view name);
 // without bound, `within` limits |d|; 0 means at rest.
 Slopes steepest(Law law, const LawNumbers& least, const LawNumbers& most, double within);
 
-// Returns the stiffness (pull) and damping that a link has at least, wherever its ends are. Not
-// above 0 for a law that may let go.
+// Returns the smallest stiffness (pull) and damping of a link at any position of its ends. Not
+// above 0 for a law that may detach.
 Slopes gentlest(Law law, const LawNumbers& least);
 
 }  // namespace ressort::laws

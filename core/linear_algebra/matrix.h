@@ -1,4 +1,4 @@
-// core/linear_algebra: matrices as plain numbers, so that nobody else needs a library's.
+// core/linear_algebra: matrices as plain numbers, so that no other room includes a matrix library.
 #pragma once
 
 #include <cmath>

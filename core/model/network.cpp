@@ -74,7 +74,7 @@ class Renumbering {
     }
     new_.outputs = std::move(old_.outputs);
     if (rests_at_zero(new_)) {
-      new_.third = ThirdArgument::delayed_position;  // its two meanings are one here
+      new_.third = ThirdArgument::delayed_position;  // The two meanings are the same from here on.
     }
     return std::move(new_);
   }

@@ -54,8 +54,8 @@ std::optional<Batch> batch_form(const Program& program) {
   return batch;
 }
 
-// A single pack waits for its own last result, so that its operations count about twice. More than
-// most_held_masses masses go through memory.
+// A single pack has to wait for its own last result, so its operations count about twice. Networks
+// of more than most_held_masses masses are stepped in memory.
 double operations(const Program& program, const Batch&, const Workload& load) {
   const LinkCount links = links_of(program);
   const double others = links.bent + links.others;

@@ -331,8 +331,8 @@ std::optional<Chains> chains_form(const Program& program, const Progress& progre
   return ChainFinder(program, progress).find();
 }
 
-// Counts per voice: a chain that stays in registers costs three operations a pack of masses, one in
-// memory as many and the turn at its ends. Everything else is stepped number by number.
+// Counts per voice: a chain that stays in registers costs three operations a pack of masses; one in
+// memory costs the same plus the work at its ends. All other elements are stepped one by one.
 double operations(const Program& program, const Chains& form, const Workload& load) {
   const FoldedBy by = fold_by(program, form, load.isa, load.is_double ? 8 : 4);
   double count = 0.0;

@@ -14,32 +14,37 @@ namespace ressort::kernels {
 struct Workload;
 class Work;
 
-// Equal masses in a row, each tied to the next by the same spring; in a stiff one also each to the
-// next but one, by a second kind of spring. What holds an end is a ground or a position input.
+// Equal masses in a row, each linked to the next by the same spring. In a stiff chain each mass is
+// also linked to the next but one by a second kind of spring. An end is free, or held by a ground
+// or a position input.
 struct Chain {
   static constexpr std::uint32_t free = 0xffffffffu;
 
-  std::uint32_t first = 0;  // of its masses in Chains::nodes, from one end to the other
+  // first of its masses in Chains::nodes, which are in order from one end to the other
+  std::uint32_t first = 0;
   std::uint32_t count = 0;
-  std::uint32_t mass_run = 0;   // of the Program, that all of them are in
+  std::uint32_t mass_run = 0;  // run of the Program that contains all of its masses
   std::uint32_t stiffness = 0;  // coefficients of the springs
   std::uint32_t damping = 0;
-  std::uint32_t left = free;  // holds the first mass by the same spring
+  std::uint32_t left = free;  // node that holds the first mass by the same spring
   std::uint32_t right = free;
   bool is_stiff = false;
   std::uint32_t second_stiffness = 0;  // coefficients of the second springs
   std::uint32_t second_damping = 0;
   std::array<std::uint32_t, 2> second_left{free,
-                                           free};  // hold the first and the second mass by one
-  std::array<std::uint32_t, 2> second_right{free, free};  // ...the last and the last but one
+                                           // nodes that hold the first and the second mass by a
+                                           // second spring
+                                           free};
+  std::array<std::uint32_t, 2> second_right{free, free};  // ...and the last and the last but one
 };
 
-// Chains folded into the lanes of packs, one voice; everything else number by number.
+// The chains of one voice, folded into the lanes of packs. All other elements are stepped one by
+// one.
 struct Chains {
   std::vector<Chain> chains;
   std::vector<std::uint32_t> nodes;  // chain by chain
   std::vector<std::uint32_t> loose;  // nodes that move and are in no chain, ascending
-  std::vector<std::uint32_t> links;  // those that are no chain's springs, ascending
+  std::vector<std::uint32_t> links;  // links that are not springs of a chain, ascending
 };
 
 inline constexpr std::uint32_t least_chain_masses = 8;  // Shorter chains are not worth folding.

@@ -9,8 +9,9 @@
 
 namespace ressort::kernels {
 
-// Counts per pack of voices: a mass costs three operations, a spring four, any other law a branch
-// and twice as many. A point on a macro is interpolated lane by lane, a body's place by all modes.
+// Counts per pack of voices: a mass costs three operations, a spring four, and any other law a
+// branch and twice as many. A point on a macro is interpolated lane by lane, and a place of a body
+// is a sum over all modes.
 double operations(const Program& program, const Direct&, const Workload& load) {
   const double packs = packs_of(load);
   const double widest = static_cast<double>(vector_bytes(load.isa)) / bytes_of_number(load);

@@ -68,7 +68,7 @@ void step_masses(const Program& program, S& s) {
   using V = typename S::V;
   for (const MassRun& run : program.mass_runs) {
     if (run.is_junction) {
-      continue;  // waves move these
+      continue;  // Waves move these nodes.
     }
     const V k = s.coefficient[run.stiffness];
     const V z = s.coefficient[run.damping];

@@ -30,7 +30,7 @@ class Bonds {
   const Program& program() const { return program_; }
   std::size_t node_count() const { return binds_.size(); }
   bool binds(std::uint32_t node) const { return binds_[node]; }
-  // Whether it has a binding neighbour.
+  // Returns whether it has a binding neighbour.
   bool is_tied(std::uint32_t node) const { return is_tied_[node]; }
   bool is_point(std::uint32_t node) const { return node >= first_point_; }
   // Returns the nodes around the point, in single or double precision.

@@ -1,9 +1,9 @@
 // core/kernels: work shared by several threads.
 //
-// In real time the audio thread must never wait for a helper thread, because the system may suspend
-// a helper at any moment for any time. So a helper performs a task on a copy of its input. If it is
-// not done in time, the audio thread performs the task itself on a third copy, and does not touch
-// the data of the late helper until that has returned.
+// The audio thread must never wait for a helper thread in real time, because the system may suspend
+// a helper at any moment for any time. A helper therefore performs a task on a copy of its input.
+// If it is not done in time, the audio thread performs the task itself on a third copy, and does
+// not touch the data of the late helper until the helper has returned.
 #pragma once
 
 #include <cstddef>

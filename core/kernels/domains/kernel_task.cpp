@@ -84,8 +84,8 @@ void KernelTask<T>::accept() {
   swap_results(aside_);
 }
 
-// The late helper keeps reading its input, so nobody writes that until it returns. The spare copy
-// becomes the current one, with the same inputs.
+// The late helper keeps reading its input, so no other thread may write that until the helper
+// returns. The spare copy becomes the current one, with the same inputs.
 template <class T>
 void KernelTask<T>::take_over() {
   perform(job_in(*spare_.kernel, spare_.buffers, spare_.halo));

@@ -62,7 +62,7 @@ class KernelTask final : public Task {
     BlockBuffers<T> buffers;
     HaloBuffers<T> halo;
   };
-  // Data of one execution; nobody else accesses it meanwhile.
+  // Data of one execution. No other thread accesses it meanwhile.
   struct Job {
     const Kernel<T>* from = nullptr;
     Kernel<T>* kernel = nullptr;

@@ -13,29 +13,30 @@ namespace ressort::kernels {
 struct Workload;
 class Work;
 
-inline constexpr std::uint32_t grid_line = 16;  // slots; as many as the widest pack has lanes
+inline constexpr std::uint32_t grid_line = 16;  // slots; the number of lanes of the widest pack
 
-// Slots that are `offsets` away from those they are linked to, all of them.
+// Slots with the same `offsets` to their neighbours.
 struct GridSegment {
   std::uint32_t first = 0;            // slots, multiples of grid_line
   std::uint32_t count = 0;            //
   std::vector<std::int32_t> offsets;  // at most most_grid_offsets
 };
 
-// Links of one run, whose second ends are `offsets` above their first.
+// Links of one run whose second ends are `offsets` above their first ends.
 struct GridLinks {
   std::uint32_t run = 0;     // of Program::link_runs
-  bool is_reversed = false;  // ...or their first above their second
+  bool is_reversed = false;  // the first ends are above the second ends instead
   std::vector<std::uint32_t> offsets;
-  std::vector<std::vector<std::uint8_t>> is_linked;  // [offset][slot - Grid::first] from there
+  // [offset][slot - Grid::first] whether this slot has the link
+  std::vector<std::vector<std::uint8_t>> is_linked;
 };
 
-// Links that fit into nothing, one by one.
+// Links that do not fit into the regular structure. They are computed one by one.
 struct GridRest {
   std::uint32_t run = 0;    // of Program::link_runs
   std::uint32_t first = 0;  // of Grid::rest_ends
   std::uint32_t count = 0;
-  bool is_excess = false;  // taken away from what the segments do instead
+  bool is_excess = false;  // subtracts links that the segments compute although they do not exist
 };
 
 // A mass outside the grid.
@@ -44,13 +45,14 @@ struct GridLoose {
   std::uint32_t slot = 0;
 };
 
-// A network of rows that are alike, one voice. Every node has a slot; those of the grid lie so that
-// what is linked is at the same few offsets everywhere, with empty slots where rows end. An empty
-// slot is a mass that stays at 0; a ground may lie in several slots, or in none if it is at 0.
+// A network of similar rows, for one voice. Every node has a slot. The slots of the grid are
+// arranged so that neighbours have the same few offsets everywhere, with empty slots at the ends of
+// rows. An empty slot is a mass that stays at 0. A ground may occupy several slots, or none if it
+// is at 0.
 //
-// With one kind of spring everywhere (`segments` is not empty), a mass feels how far y = K x + Z v
-// is from its own at every offset, less what it feels from the `missing` ones. Otherwise the forces
-// of each law in `links` are computed one by one, offset by offset.
+// If there is one kind of spring everywhere (`segments` is not empty), the force on a mass is the
+// sum over all offsets of the differences of y = K x + Z v, minus the differences to the `missing`
+// neighbours. Otherwise the forces of each law in `links` are computed offset by offset.
 struct Grid {
   std::uint32_t slots = 0;
   std::uint32_t first = 0;     // slots [first, first + count) are the grid, multiples of grid_line;
@@ -62,7 +64,8 @@ struct Grid {
   std::vector<std::uint8_t> moves;    // [slot - first] 1 where a mass is, 0 elsewhere
   std::uint32_t spring_run = 0;       // of Program::link_runs, for the segments
   std::vector<GridSegment> segments;  // none overlap
-  // [slot - first] how many offsets lead to nobody; fewer, by those that hold it at 0 besides
+  // [slot - first] number of offsets without a neighbour, minus the number of additional springs to
+  // 0
   std::vector<std::int8_t> missing;
   std::vector<GridLinks> links;
   std::vector<GridRest> rest;
@@ -75,7 +78,7 @@ inline constexpr std::size_t most_grid_offsets = 8;
 
 inline constexpr std::uint32_t least_grid_masses = 16;
 
-// Makes the tables of a Program whose masses are mostly alike and lie in similar rows, in any order
+// Makes the tables of a Program whose masses are mostly equal and lie in similar rows, in any order
 // of numbering. Few links may be left over, and no output may be a force. O(n log n). [any thread
 // but audio]
 std::optional<Grid> grid_form(const Program& program, const Progress& progress = {});

@@ -64,7 +64,8 @@ std::vector<std::int64_t> shifts(const GridGraph& graph, const std::vector<Addre
   std::vector<std::int64_t> shift(rows.size(), 0);
   std::set<std::int64_t> known;  // Column differences to the previous row.
   for (std::uint32_t row = 1; row < rows.size(); ++row) {
-    std::map<std::int64_t, std::size_t> differences;  // With this row unshifted.
+    // Counts the column differences without a shift of this row.
+    std::map<std::int64_t, std::size_t> differences;
     each_link(graph, all, rows[row], [&](const Address& here, const Address& there) {
       if (there.row == row - 1) {
         ++differences[here.column - there.column - shift[row - 1]];

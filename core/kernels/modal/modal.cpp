@@ -306,7 +306,7 @@ void ModalKernel<T>::strike(std::size_t, std::span<const std::uint32_t> nodes,
     const double damping = state_.motion.is_stale ? 0.0 : static_cast<double>(state_.motion.z[i]);
     const double gain =
         state_.motion.root != nullptr ? static_cast<double>(state_.motion.root[i]) : 1.0;
-    // A mode that decays within a sample does not ring, such as one above half the rate.
+    // A mode that decays within a sample, such as one above half the rate, does not ring.
     state_.motion.d[i] += damping < 1.0 ? static_cast<T>(gain * felt / (1.0 - damping)) : T(0);
   }
   wake_all();

@@ -16,7 +16,8 @@
 
 namespace ressort::kernels {
 
-inline constexpr std::uint32_t check_frames = 32;  // between two checks for modes that may sleep...
+// interval between two checks for modes that may sleep...
+inline constexpr std::uint32_t check_frames = 32;
 inline constexpr std::uint32_t long_check_frames = 128;  // ...while few are awake
 
 // Largest number of passive links that modal_straight.h solves: the lanes of the widest pack.
@@ -35,13 +36,13 @@ template <class T>
 struct ModalShapes {
   std::size_t modes;
   std::size_t stride;
-  const T* stiffness;   // factors, of each share in the packs where it has any
-  const T* damping;     // the same
+  const T* stiffness;  // [share] factors, in the packs where the share has any
+  const T* damping;  // the same for damping
   T* pushes;            // [push][mode], followed without a gap by places and outputs
   T* places;            // [place][mode]
   T* outputs;           // [output][mode]
   const T* unscaled;    // [push, place, output][mode] of exact modes, as the form has them
-  const T* push_norm;   // [push] length of the shape
+  const T* push_norm;  // [push] length of its row
   const T* place_norm;  // [place]
 };
 
@@ -72,16 +73,16 @@ struct ModalSleepPace {
 template <class T>
 struct ModalSleep : ModalSleepPace {
   T* spread;      // [mode] square of the amplitude per that of the state; 0: does not ring
-  T* decay;       // [mode] of an amplitude in check_frames
+  T* decay;  // [mode] decay of an amplitude in check_frames
   T* amplitude;   // [mode]
-  T* debt;        // [mode] amplitude of what was dropped
-  T* loudness;    // [listener] now or lately
-  T* room;        // [listener] what may still be dropped
-  T silence;      // share of `loudness` that may be dropped; 0: nothing sleeps
-  T lately_kept;  // of `loudness` in check_frames
+  T* debt;  // [mode] amplitude of the dropped motion
+  T* loudness;  // [listener] recent loudness
+  T* room;  // [listener] amplitude that may still be dropped
+  T silence;  // share of `loudness` that may be dropped; 0: no mode sleeps
+  T lately_kept;  // decay of `loudness` in check_frames
 };
 
-// The rows that one pass over all modes takes along, and what it returns.
+// The rows that one pass over all modes uses, and its results.
 struct ModalSweepPace {
   std::size_t bundled = 0;  // rows in the bundle
   std::size_t bundled_modes = 0;
@@ -100,20 +101,20 @@ struct ModalSweep : ModalSweepPace {
 
 // Amplitudes of inputs and constant forces.
 struct ModalInputsPace {
-  std::size_t pushing = 0;  // pushes that are not 0 in this block
+  std::size_t pushing = 0;  // number of pushes that are not 0 in this block
 };
 template <class T>
 struct ModalInputs : ModalInputsPace {
-  std::uint32_t* push_of;  // [0, pushing) which these are
+  std::uint32_t* push_of;  // [0, pushing) their indices
   T* amplitude;            // [frame][push]
-  T* late;                 // [push] of the sample before, if it acts late
+  T* late;  // [push] amplitude of the sample before, if it acts late
 };
 
 // Positions of the ends, forces on them, and bounds on their motion (modal_bounds.h).
 template <class T>
 struct ModalEndsPace {
   bool has_bounds = false;
-  T kick_norm = 0;  // what the links added to the norm in their last block
+  T kick_norm = 0;  // growth of the norm by the links in their last block
 };
 template <class T>
 struct ModalEnds : ModalEndsPace<T> {
@@ -121,31 +122,31 @@ struct ModalEnds : ModalEndsPace<T> {
   T* v;           // [end] change per sample
   T* force;       // [end] summed by the plain links, used by the next sample
   T* exerted;     // [end] by passive links, in this sample
-  T* kicked;      // [place] sum of the sizes of a block's kicks
-  T* compliance;  // [place] greatest square of its displacement per energy
+  T* kicked;  // [place] sum of the magnitudes of a block's kicks
+  T* compliance;  // [place] largest squared displacement per unit of energy
 };
 
 // The links that are computed in this block, and the places that they need.
 struct ModalHeldPace {
   std::uint32_t places = 0;
-  std::size_t links = 0;               // that are computed, plain and passive
-  std::size_t all_links = 0;           // that there are
-  std::uint32_t touched_frames = 0;    // until a block is tried as a free one
-  std::uint32_t surprised_frames = 0;  // until fewer than all links are computed
+  std::size_t links = 0;  // number of computed links, plain and passive
+  std::size_t all_links = 0;  // total number of links
+  std::uint32_t touched_frames = 0;  // samples until a block is tried as a free one
+  std::uint32_t surprised_frames = 0;  // samples until fewer than all links are computed
 };
 template <class T>
 struct ModalHeld : ModalHeldPace {
   std::uint32_t* row_of;    // [place] its row, or nowhere
   std::uint32_t* place_of;  // [row] its place
-  std::uint32_t* count_of;  // [hold] how many of its links are computed
+  std::uint32_t* count_of;  // [hold] number of its links that are computed
   Ends* ends;               // [plain link that is computed]
   T* give;                  // [plain link that is computed]
 };
 
 // The links of the holds that are not plain, in their order (modal_passive.h).
 struct ModalPassivePace {
-  bool pulls = false;         // they act from the second sample on
-  bool is_pushed = false;     // one has pushed in the last sample
+  bool pulls = false;  // the links act from the second sample on
+  bool is_pushed = false;  // a link exerted a force in the last sample
   bool shoves_later = false;  // the next sweep adds `shove`
   bool is_reply_stale = true;
   bool is_straight_stale = true;
@@ -154,23 +155,24 @@ template <class T>
 struct ModalPassive : ModalPassivePace {
   std::size_t count;
   const PassiveLink* links;  // [link]
-  PassiveTables* active;     // those that are computed; their ends are {which link, nobody}
-  T* reply;                  // [listener][link] how far a push of 1 between its ends moves it, by w
-  T* gamma;                  // [link][link] how far a push of 1 closes another, by w
-  T* opening;                // [link] distance of its ends, once all has moved
-  T* rush;                   // [link] and its change per sample
+  PassiveTables* active;  // the computed links; their ends are {index of the link, nobody}
+  T* reply;  // [listener][link] displacement by a unit push between the link's ends, for w = 1
+  T* gamma;  // [link][link] change of one distance by a unit push of another link, for w = 1
+  T* opening;  // [link] distance of its ends after everything has moved
+  T* rush;  // [link] its change per sample
   T* memory;                 // [active][passive_rows]
   T* numbers;                // workspace of the solver
   T* straight;               // workspace of modal_straight.h
   T* pushed;                 // [link] force
-  T* shove;                  // [row] what the forces add to q and d along the row of a place
+  T* shove;  // [row] displacement of q and d along the row of a place by the forces
   const T* give;             // [link] as ModalHold::give
-  T* slack;                  // [link] the same, by the coefficients of now
-  T* yield;                  // [link] displacement of its ends by the modes that are left out
-  T* yield_step;             // [link] and its change in the last sample
+  T* slack;  // [link] the same for the current coefficients
+  T* yield;  // [link] displacement of its ends by the omitted modes
+  T* yield_step;  // [link] its change in the last sample
 };
 
-// A copy of what a block may change, from its start: a block may have to be played again.
+// A copy of the state that a block may change, from the start of the block, because a block may
+// have to be computed again.
 struct ModalSavedPace {
   std::size_t awake = 0;
   bool pulls = false;
@@ -208,7 +210,7 @@ struct ModalState {
   ModalSaved<T> saved;
   ModalForces<T> forces;
 
-  // Copies everything that changes and is not in an array.
+  // Copies all numbers that change and are not in arrays.
   void take_pace(const ModalState& from) {
     static_cast<ModalMotionPace&>(motion) = from.motion;
     static_cast<ModalSleepPace&>(sleep) = from.sleep;

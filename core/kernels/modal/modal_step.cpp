@@ -686,7 +686,7 @@ struct ModalPlayer {
   bool presses() const { return !s.passive.active->links.empty(); }
 
   // Returns whether the displacements by passive links may be added in the next sample's sweep.
-  // That sweep must have no other kicks, and nothing may read the modes before.
+  // This requires that the sweep has no other kicks and that nothing reads the modes before it.
   bool may_shove_later() const {
     const bool is_all = std::all_of(s.held.count_of, s.held.count_of + modes.holds.size(),
                                     [](std::uint32_t plain) { return plain == 0; });

@@ -94,7 +94,7 @@ namespace {
 template <class V>
 constexpr Scalar<V> share_of_rounding = laws::tiny_share<V>() * 2;
 
-// Whether a kernel's masses are nodes of their own.
+// Tells whether a kernel's masses are nodes of their own.
 template <class Body, class V>
 concept HasMasses = requires(Body body) {
   body.shift(0u, V{});

@@ -150,7 +150,7 @@ class Places {
 
   void substitute() {
     for (std::size_t k = 0; k < count_; ++k) {
-      // In exact arithmetic the pivot is at least 1.
+      // The pivot is at least 1 in exact arithmetic.
       const V pivot = matrix_[k * count_ + k];
       const V inverse = 1 / select(pivot > V{} + 1, pivot, V{} + 1);
       for (std::size_t i = k + 1; i < count_; ++i) {

@@ -31,7 +31,7 @@ inline constexpr int most_stiffenings = 24;
 
 namespace {
 
-// In a lane's first sample links exert no force, since the previous motion is unknown. But the
+// Links exert no force in a lane's first sample, since the previous motion is unknown. But the
 // potential energy must not exceed the lower of its values at the start and one sample earlier (by
 // the initial speed). The difference is taken out of the motion. `step` is from that earlier
 // sample.
@@ -375,7 +375,7 @@ class Joint {
     return link.steady + link.damping * step + at;
   }
 
-  // In the first sample the potential counts from the start position only.
+  // The potential of the first sample counts from the start position only.
   V from_start(const Joined<V>& link) const {
     return link.step - select(is_first_, link.speed, V{});
   }

@@ -336,8 +336,8 @@ class ByLinks {
   }
   V pulled(std::size_t link) const { return pulled_[link]; }
 
-  // With h = C (value - force), T = S^1/2 and T z = y: solves (I + T C T) y = T h; then push = off
-  // - T y and way = -C push.
+  // Solves (I + T C T) y = T h with h = C (value - force), T = S^1/2 and T z = y; then push = off -
+  // T y and way = -C push.
   void solve(Joined<V>* joined, bool) {
     for (std::size_t i = 0; i < count_; ++i) {
       const Joined<V>& link = joined[i];

@@ -49,15 +49,16 @@ struct Line {
   double theta;  // the pole's angle
   Complex rise;
 
-  // So long that the phase is right.
+  // Returns the delay for which the phase is right.
   double delay(double room) const { return (turn + log_of_loss(room, rise).imag()) / theta; }
-  // By how much it is then too loud: falls as the room does.
+  // Returns the excess of the loop gain at that delay. It falls as `room` falls.
   double over(double room) const {
     return log_gain + log_of_loss(room, rise).real() + decay * delay(room);
   }
 };
 
-// Where it is right as well: by halves, since 1 - a may be small, then by Newton's method.
+// Finds the `room` at which the gain is right as well: by bisection, because 1 - a may be small,
+// then by Newton's method.
 double room_of(const Line& line) {
   double low = -60.0;
   double high = 0.0;
@@ -83,7 +84,7 @@ struct Loop {
   double samples;
   Complex back = std::polar(std::exp(decay), -theta);  // 1/z at the pole
 
-  // Returns ln L(z); the next functions return its derivatives by ln(1 - a) and by the allpass.
+  // Returns ln L(z). The next functions return its derivatives by ln(1 - a) and by the allpass.
   Complex log(double room, double allpass) const {
     return log_gain + log_of_loss(room, rise) +
            std::log((allpass + back) / (1.0 + allpass * back)) + samples * Complex(decay, -theta);
@@ -123,7 +124,7 @@ void refine(const Loop& loop, double room, WaveguideDesign& design) {
   }
 }
 
-// The same if all partials decay alike: the gain is the unknown.
+// The same if all partials decay equally: the gain is the unknown.
 void refine_flat(const Loop& loop, WaveguideDesign& design) {
   for (int i = 0; i < most_newton_steps; ++i) {
     const double off = std::remainder(loop.log(0.0, design.allpass).imag(), turn);

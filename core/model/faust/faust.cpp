@@ -516,9 +516,9 @@ class FaustWaveguides {
     return words;
   }
 
-  // Names of the signals that carry each waveguide's filter coefficients and the positions of its
-  // places into the model. As plain definitions FAUST would evaluate them again at every use, which
-  // takes forever.
+  // Returns the names of the signals that carry each waveguide's filter coefficients and the
+  // positions of its places into the model. As plain definitions FAUST would evaluate them again at
+  // every use, which would take too long.
   std::vector<std::string> numbers() const {
     std::vector<std::string> words;
     for (const Guide& guide : guides_) {
@@ -1019,7 +1019,7 @@ class Writer {
     return sum;
   }
 
-  // The definitions y_, o_ and u_ of the ends of passive links that are no masses.
+  // The definitions y_, o_ and u_ of the ends of passive links that are not masses.
   std::string held_before(std::uint32_t i) const {
     const Mass& mass = network_.masses[i];
     if (!passive_.is_held(i) || moves(i) || mass.kind == MassKind::junction) {

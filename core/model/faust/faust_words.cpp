@@ -17,7 +17,7 @@ bool is_word(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
 }
 
-// FAUST definitions that are no laws. A comparison only ever selects here and in the laws' texts:
+// FAUST definitions other than laws. A comparison only ever selects here and in the laws' texts:
 // FAUST takes ten times as long to infer the types of a program that computes with comparisons.
 constexpr std::string_view helpers = R"(
 swing(m, k, z, x0, v0, f) = step ~ (_, _)

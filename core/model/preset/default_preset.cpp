@@ -94,7 +94,7 @@ int usual_voices(const Network& network) {
                     1, 8);
 }
 
-// Returns a reference to something that a force input could strike, or "" if nothing moves.
+// Returns a reference to an element that a force input could strike, or "" if no mass moves.
 std::string something_to_strike(const Network& network) {
   for (const Mass& mass : network.masses) {
     if (moves(mass)) {

@@ -116,7 +116,7 @@ inline constexpr std::size_t most_preset_errors = 100;
 struct PresetKey {
   std::string_view table;  // "" for the preset itself
   std::string_view key;
-  std::string_view value;  // what it takes, and what it is without the key
+  std::string_view value;  // the accepted values, and the default
   std::string_view does;
 };
 std::span<const PresetKey> preset_keys();
