@@ -66,7 +66,7 @@ const char* const chart_examples =
     "marks\n"
     "further down more accurate. Grey stairs join the marks of the Pareto front. A red cross at "
     "the\n"
-    "top edge marks a method that gains energy when the scene is hit ten times harder.\n"
+    "top edge marks a method that gains energy when the scene is struck ten times harder.\n"
     "Writes chart.csv, whose first lines explain its columns, and, if gnuplot is installed,\n"
     "overview.svg and SCENE.svg. Other programs that run meanwhile disturb the times. Ctrl-C "
     "keeps\n"

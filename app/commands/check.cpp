@@ -118,7 +118,7 @@ json parameter_json(const ParameterInfo& info, int input, const std::optional<Sa
 
 json stability_json(const Proved& proved) {
   json out{{"verdict", verdict_name(proved.certificate.verdict)},
-           {"limits_hold", proved.others_move ? "in all ranges" : "at the start's values"},
+           {"limits_hold", proved.others_move ? "in all ranges" : "at the initial values"},
            {"stiffness_factor", limit_json(proved.stiffness_factor)}};
   if (const std::optional<Culprit>& culprit = proved.certificate.culprit) {
     out["culprit"] = {{"name", culprit->name},
@@ -225,7 +225,7 @@ std::string conclusion(const Scene& scene, const Proved& proved) {
       return has_ranges
                  ? "not stable in all ranges of the parameters; the limits above hold for one "
                    "parameter while the others keep their initial values"
-                 : "not stable; the limits above hold for one parameter while the others stay";
+                 : "not stable; the limits above hold for one parameter while the others keep their values";
     case Verdict::unproved:
       return "not proved stable" + by_bound(proved);
   }

@@ -48,14 +48,14 @@ void print_keywords() {
 }
 
 void print_preset_keys() {
-  print_head({"table", "key", "value", "what it does"});
+  print_head({"table", "key", "value", "meaning"});
   for (const PresetKey& key : preset_keys()) {
     print_row({code(key.table), code(key.key), std::string(key.value), std::string(key.does)});
   }
 }
 
 void print_gestures() {
-  print_head({"how", "what the input does"});
+  print_head({"how", "motion of the input"});
   for (const GestureRow& gesture : gestures) {
     if (!gesture.does.empty()) {
       print_row({code(gesture.name), std::string(gesture.does)});
@@ -64,14 +64,14 @@ void print_gestures() {
 }
 
 void print_addresses() {
-  print_head({"address", "arguments", "what it does"});
+  print_head({"address", "arguments", "effect"});
   for (const Row* const row : addresses()) {
     print_row({code(row->address), code(row->arguments_text()), std::string(row->does)});
   }
 }
 
 void print_commands() {
-  print_head({"command", "arguments", "what it does"});
+  print_head({"command", "arguments", "effect"});
   for (const Row* const row : command_rows()) {
     print_row({code(row->command), code(row->words), std::string(row->command_does)});
   }
@@ -86,7 +86,7 @@ void print_status() {
   std::stable_sort(rows.begin(), rows.end(), [](const StatusRow* a, const StatusRow* b) {
     return static_cast<unsigned>(a->place) < static_cast<unsigned>(b->place);
   });
-  print_head({"place", "figure", "unit", "what it says"});
+  print_head({"place", "figure", "unit", "meaning"});
   for (const StatusRow* const row : rows) {
     print_row({row->place == not_in_reply ? "" : std::to_string(row->place + 1), code(row->name),
                std::string(row->unit), std::string(row->does)});
@@ -94,7 +94,7 @@ void print_status() {
 }
 
 void print_midi() {
-  print_head({"message", "number", "received", "what it does"});
+  print_head({"message", "number", "received", "effect"});
   for (const MidiChartRow& row : midi_chart()) {
     print_row({std::string(row.message), std::string(row.number), row.is_received ? "yes" : "no",
                std::string(row.does)});
@@ -112,12 +112,12 @@ void print_materials() {
 constexpr ReferencePart parts[] = {
     {"model", "the keywords of a .mdl file", print_keywords},
     {"preset", "the keys of a preset", print_preset_keys},
-    {"gestures", "what a preset's control may do with an input", print_gestures},
+    {"gestures", "the gestures of a preset's controls", print_gestures},
     {"midi", "the MIDI implementation chart", print_midi},
     {"osc", "the addresses of OSC and of scores", print_addresses},
     {"console", "the console's commands", print_commands},
     {"status", "the figures of /status.reply and of the console", print_status},
-    {"materials", "what a solid may be of", print_materials},
+    {"materials", "the materials of solids", print_materials},
 };
 
 }  // namespace

@@ -332,9 +332,9 @@ std::string describe(const InputInfo& input) {
       known.emplace_back(row.name);
     }
   }
-  return std::string(input.is_force ? "a force on " : "a hand at ") +
+  return std::string(input.is_force ? "a force on " : "a position at ") +
          (input.attached_to.empty() ? "nothing" : input.attached_to) +
-         (known.empty() ? "" : "; knows " + joined(known, " and "));
+         (known.empty() ? "" : "; accepts " + joined(known, " and "));
 }
 
 std::string describe_stability(const Instrument& instrument) {
@@ -349,7 +349,7 @@ std::string describe_stability(const Instrument& instrument) {
                                fixed(std::max(0.0, margin), 2) + " of the stiffness";
 }
 
-// Returns a row such as "cc71 (learnt)" with its effect for every control and controller.
+// Returns a row such as "cc71" with its effect for every control and controller.
 std::vector<std::vector<std::string>> control_rows(const ConsoleContext& console,
                                                    const Loaded& current) {
   std::vector<std::vector<std::string>> rows;
@@ -360,7 +360,7 @@ std::vector<std::vector<std::string>> control_rows(const ConsoleContext& console
   const std::vector<LearnedRow> learned = console.session.learned();
   for (const LearnedRow& row : learned) {
     rows.push_back({"cc" + std::to_string(row.controller),
-                    "turns " + row.target + ", as it has learnt" + now(row.target)});
+                    "controls " + row.target + ", learned" + now(row.target)});
   }
   for (const ControlSetting& control : current.preset.controls) {
     const bool is_replaced =
@@ -377,7 +377,7 @@ std::vector<std::vector<std::string>> control_rows(const ConsoleContext& console
                                           : ", keys " + std::to_string(control.lowest_key) +
                                                 " to " + std::to_string(control.highest_key);
     rows.push_back({source_name(control),
-                    (turns ? "turns " + control.target
+                    (turns ? "controls " + control.target
                            : std::string(row_of(control.gesture).name) + " at " + control.target) +
                         ", " + range + (control.exponential ? ", exponential" : "") + keys +
                         (turns ? now(control.target) : "")});

@@ -56,8 +56,8 @@ Result<Done> command::unlearn(ConsoleContext& console, Words words) {
   if (count == 0 && !target.empty()) {
     return Error{"no controller is assigned to '" + target + "'"};
   }
-  console.print(counted(count, "controller does", "controllers do") +
-                " again its function in the preset");
+  console.print(counted(count, "controller has", "controllers have") +
+                " the function in the preset again");
   return Done{};
 }
 

@@ -33,7 +33,7 @@ Events set_parameters(const Said& said) {
     names.push_back(info.name);
     if (info.audio_input > 0 && said.name == info.name) {
       return Error{said.message.address + ": input " + std::to_string(info.audio_input) +
-                   " gives it, sample by sample; it cannot be set"};
+                   " sets it in every sample, so no message can"};
     }
     if (info.audio_input == 0 && fits(said.name, info.name)) {
       events.push_back({.kind = EventKind::parameter,
@@ -56,8 +56,8 @@ Events play_input(const Said& said, const GestureRow& gesture) {
     misfit = "has no " + std::string(gesture.name) + " in this preset";
   } else if (gesture.live != Live::by_preset &&
              input.is_force != (gesture.live == Live::on_forces)) {
-    misfit = input.is_force ? "takes a force, no position: use /in/N/force"
-                            : "takes a position, no force: use /in/N/position";
+    misfit = input.is_force ? "accepts a force, not a position: use /in/N/force"
+                            : "accepts a position, not a force: use /in/N/position";
   }
   if (!misfit.empty()) {
     return Error{said.message.address + ": input " + std::to_string(input.number) + " " + misfit};
@@ -90,7 +90,7 @@ Result<std::uint32_t> find_mass(std::span<const StruckInfo> known, std::string_v
     const auto read = std::from_chars(std::min(name.data() + colon + 1, end), end, at);
     if (read.ec == std::errc{} && read.ptr == end && at >= 1 && at <= found->moves.size()) {
       return found->moves[at - 1] ? Result<std::uint32_t>(found->first + at - 1)
-                                  : Error{std::string(name) + " is held, or nobody hears it"};
+                                  : Error{std::string(name) + " is fixed, or no output hears it"};
     }
   }
   constexpr std::size_t most_named = 8;

@@ -329,7 +329,7 @@ struct Terminal::Input {
       set_editing(false);
       if (!line.ends_with('\n')) {
         ressort::say(must_end() ? ""
-                                : "\nThe console is closed, the sound goes on; Ctrl-C ends it.");
+                                : "\nThe console is closed and the sound continues; press Ctrl-C to quit.");
         break;
       }
       const std::string words = line.substr(0, line.find_last_not_of(" \t\n") + 1);

@@ -325,7 +325,7 @@ struct WebPanel::Server {
         static_cast<std::size_t>(number_of(request, "count", 24, 1, most_modes_shown));
     const std::unique_lock lock(searching, std::try_to_lock);
     if (!lock) {
-      return say(response, 503, "the modes are being looked for");
+      return say(response, 503, "a search for the modes is already running");
     }
     const Progress progress([this](std::string_view) { return pause({}); });
     try {
@@ -361,7 +361,7 @@ struct WebPanel::Server {
   void stream_motion(const Request& request, Response& response) {
     const auto seat = enter(watching);
     if (seat == nullptr) {
-      return say(response, 503, "enough are watching");
+      return say(response, 503, "too many viewers");
     }
     const double hz = number_of(request, "hz", usual_hz, 1.0, fastest_hz);
     const bool is_slow = number_of(request, "slow", 0.0, 0.0, 1.0) > 0.5;
@@ -390,7 +390,7 @@ struct WebPanel::Server {
   void stream_events(Response& response) {
     const auto seat = enter(listening);
     if (seat == nullptr) {
-      return say(response, 503, "enough are watching");
+      return say(response, 503, "too many viewers");
     }
     response.set_chunked_content_provider(
         "text/event-stream", [this, seat, heard = std::uint64_t{0}, changes = Changes()](
@@ -471,7 +471,7 @@ Result<std::unique_ptr<WebPanel>> WebPanel::open(const PanelOptions& options, Pr
   auto server = std::make_unique<Server>(options, process, session, motion, osc);
   if (!server->bind(options.port)) {
     return Error{"port " + std::to_string(options.port) + " of " + options.bind_address +
-                 " is taken, or is not ours to take; --web takes another"};
+                 " is in use or needs privileges; choose another with --web"};
   }
   server->listen();
   return std::unique_ptr<WebPanel>(new WebPanel(std::move(server)));

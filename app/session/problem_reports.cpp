@@ -31,7 +31,7 @@ void ProblemReports::add_lost_events(const Meters& now) {
               now.late - std::exchange(late_seen_, now.late));
   }
   if (now.dropped != dropped_seen_) {
-    dropped_.add("an event was dropped, because more events came than can be played",
+    dropped_.add("an event was dropped, because more events arrived than can be played",
                  now.dropped - std::exchange(dropped_seen_, now.dropped));
   }
 }

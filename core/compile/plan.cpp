@@ -31,7 +31,7 @@ std::string rounded(double value) {
 
 std::string describe(const Accuracy& accuracy) {
   if (!accuracy.is_known) {
-    return "its error against the continuous network is not known";
+    return "its error against the continuous network is unknown";
   }
   if (!std::isfinite(accuracy.cents)) {
     return "without a partial of the continuous network";
@@ -111,7 +111,7 @@ class Chooser {
     consider(Method::direct);
     if (method == Method::direct || consider(method)) {
       best_ = candidates_.size() - 1;
-      return take("as asked for");
+      return take("as requested");
     }
     return take(std::string(method_name(method)) + " cannot do this part");
   }
@@ -493,7 +493,7 @@ std::optional<std::string> broken_promise(const Plan& plan) {
   return accuracy.is_known
              ? "the budget " + promised + " is not kept: a partial may be " +
                    (accuracy.is_bound ? "up to " : "") + found + " off"
-             : "whether the budget " + promised + " is kept is not known: the poles of so many " +
+             : "it is unknown whether the budget " + promised + " is kept: the poles of so many " +
                    "masses would take too long to compute";
 }
 
@@ -509,7 +509,7 @@ std::string describe(const std::vector<Part>& parts) {
                  : "") +
             ")\n";
   }
-  return text.empty() ? "nothing moves\n" : text;
+  return text.empty() ? "no mass moves\n" : text;
 }
 
 std::string describe(const Plan& plan) {

@@ -491,7 +491,7 @@ void warn_of_recording(const Blow& blow, Identification& found) {
   if (blow.length_s > longest_ring_s + 0.001 && rings_s > longest_ring_s - 0.001) {
     found.warnings.push_back("only the first " + number("%.0f", longest_ring_s) +
                              " s after the blow, at " + number("%.3g", found.onset_s) +
-                             " s, are looked at");
+                             " s, are analysed");
   }
 }
 
@@ -499,7 +499,7 @@ void warn_of_recording(const Blow& blow, Identification& found) {
 
 Result<Identification> identify(const Recording& recording, const IdentifyOptions& options,
                                 const Progress& progress) try {
-  progress.stage("looking for the blow");
+  progress.stage("searching for the blow");
   auto blow = find_blow(recording);
   if (!blow) {
     return blow.error();

@@ -55,7 +55,7 @@ std::size_t whole_pack_bytes(Isa isa) {
 std::string_view isa_name(Isa isa) {
   switch (isa) {
     case Isa::base:
-      return "SSE2 or alike";
+      return "SSE2 or similar";
     case Isa::v3:
       return "AVX2";
     case Isa::v4:

@@ -53,8 +53,8 @@ template <class V>
 struct ClippedSpring {
   static constexpr LawFacts facts = {
       .name = "clipped_spring",
-      .one = "spring that bends",
-      .many = "springs that bend",
+      .one = "nonlinear spring",
+      .many = "nonlinear springs",
       .count = 4,
       .arguments = {{{Role::stiffness, Unit::stiffness},
                      {Role::bend, Unit::stiffness},

@@ -11,8 +11,8 @@ template <class V>
 struct CubicSpring {
   static constexpr LawFacts facts = {
       .name = "cubic_spring",
-      .one = "spring that bends",
-      .many = "springs that bend",
+      .one = "nonlinear spring",
+      .many = "nonlinear springs",
       .count = 3,
       .arguments = {{{Role::stiffness, Unit::stiffness},
                      {Role::bend, Unit::stiffness},

@@ -29,8 +29,8 @@ template <class V>
 struct PowerContact {
   static constexpr LawFacts facts = {
       .name = "power_contact",
-      .one = "contact by a power",
-      .many = "contacts by a power",
+      .one = "power-law contact",
+      .many = "power-law contacts",
       .count = 4,
       .arguments = {{{Role::stiffness, Unit::stiffness},
                      {.role = Role::shape, .unit = Unit::plain, .least = 1.0, .most = 5.0},

@@ -11,8 +11,8 @@ template <class V>
 struct QuadraticSpring {
   static constexpr LawFacts facts = {
       .name = "quadratic_spring",
-      .one = "spring that bends",
-      .many = "springs that bend",
+      .one = "nonlinear spring",
+      .many = "nonlinear springs",
       .count = 3,
       .arguments = {{{Role::stiffness, Unit::stiffness},
                      {Role::bend, Unit::stiffness},

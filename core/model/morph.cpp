@@ -241,7 +241,7 @@ class Morphing {
       return is_on_body(link.a) || is_on_body(link.b);
     });
     if (!driven || has_links) {
-      return refuse(has_links ? "links hold on to it" : "no input drives it");
+      return refuse(has_links ? "links are attached to it" : "no input drives it");
     }
     const auto in = places_of(out_.masses[*driven].tap);
     std::vector<std::string> names = {"driven"};
@@ -413,8 +413,8 @@ Result<Network> morphed(const Network& base, std::span<const MorphStop> stops,
       if (one.audio_input > 0 &&
           std::none_of(base.parameters.begin(), base.parameters.end(),
                        [&](const Parameter& other) { return other.name == one.name; })) {
-        return Error{"audio gives " + stop.name + " a parameter " + quoted(one.name) +
-                     " that the model of the morph has not"};
+        return Error{"an audio input sets the parameter " + quoted(one.name) + " of " + stop.name +
+                     ", which the model of the morph does not have"};
       }
     }
   }

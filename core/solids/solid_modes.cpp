@@ -312,7 +312,7 @@ Result<SolidModes> find_solid_modes(const SolidMesh& mesh, const SolidMaterial& 
                     std::begin(pairs->values), std::end(pairs->values),
                     [&](double value) { return std::abs(value) < rigid_share * std::abs(shift); }));
   if (at(modes.rigid) >= pairs->values.size()) {
-    return Error{"nothing of it can bend"};
+    return Error{"no part of it can bend"};
   }
   for (const QuadraticTetrahedron& element : mesh.elements) {
     const Point3& origin = mesh.points[at(element[0])];

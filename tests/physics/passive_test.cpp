@@ -416,7 +416,7 @@ TEST_CASE("links without a stability proof are made passive, with a note", "[pas
   CHECK(found(usual) == std::vector{plain, passive, plain, passive, passive, passive});
   CHECK(usual.notes ==
         std::vector<std::string>{
-            "1 spring that bends made passive: as published it could become unstable at large "
+            "1 nonlinear spring made passive: as published it could become unstable at large "
             "amplitudes",
             "1 bow made passive: as published it could stick one sample too late",
             "2 contacts made passive: as published they could gain energy at each contact"});
@@ -426,7 +426,7 @@ TEST_CASE("links without a stability proof are made passive, with a note", "[pas
   REQUIRE(never.hazard);
   CHECK(never.hazard->line == 7);
   CHECK(never.hazard->message ==
-        "played as published: 1 spring that bends, 1 bow, 2 contacts may gain energy. Use "
+        "played as published: 1 nonlinear spring, 1 bow, 2 contacts may gain energy. Use "
         "--budget passive=auto to prevent it");
   CHECK(!usual.hazard);
   // Two bows of different profiles, and springs of two laws, share one note.
@@ -435,7 +435,7 @@ TEST_CASE("links without a stability proof are made passive, with a note", "[pas
           network_of(text + "@b2 nlBow @in1 @m 0.2 0.01 1\n@q2 nlSpring2 @g @n 0. 3. 0.\n"), {})
           .notes;
   REQUIRE(notes.size() == 3);
-  CHECK(notes[0].starts_with("2 springs that bend made passive"));
+  CHECK(notes[0].starts_with("2 nonlinear springs made passive"));
   CHECK(notes[1].starts_with("2 bows made passive"));
   // Passive links need no proof, except for a spring's slope at rest.
   CHECK(without_passive(network, usual.links).links.size() == 3);

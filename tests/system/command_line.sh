@@ -92,12 +92,12 @@ model free.mdl '@k param 0.1\n@z param 0.001\n@s string 20 1. k z 0. 0.\n@in1 fr
 expect 0 "0.00 JND" "$program" shape free.mdl --f0 300 --t60 3 -o shaped.toml
 expect 0 "300.000" "$program" modes shaped.toml --modes 1
 expect 2 "shaped.toml' exists already" "$program" shape free.mdl --f0 300 -o shaped.toml
-expect 0 "as high as it gets is" "$program" shape free.mdl --f0 20000
+expect 0 "is as high as it gets" "$program" shape free.mdl --f0 20000
 expect 0 '"attack_ms"' "$program" shape free.mdl --attack 8 --json
 expect 2 "must be a number above 0" "$program" shape free.mdl --attack 0
 expect 0 '"k": "highest"' "$program" shape free.mdl --f0 20000 --json
 expect 0 "key 60 (C4 +0)" "$program" shape PolyTriangle --note 60 --centroid 400 --json
-expect 0 "as dark as it gets with the rest is" "$program" shape free.mdl --like blow.flac --t60 3
+expect 0 "is as dark as it gets with the other targets" "$program" shape free.mdl --like blow.flac --t60 3
 expect 2 "keys set the pitch of PolyTriangle" "$program" shape PolyTriangle --f0 100
 expect 2 "bar.mdl:1:1: error: there is no parameter to adjust" "$program" shape bar.mdl --t60 3
 expect 2 "here is a bow" "$program" shape BowedString --t60 3
@@ -148,7 +148,7 @@ expect 2 "--motion" "$program" check motion.mdl --motion sideways
 model motion.toml 'model = "motion.mdl"\nmotion = "velocity"\n'
 expect 0 "~motion velocity" "$program" check motion.toml --print
 expect 0 "motion: a velocity in units per second, as the preset says" "$program" check motion.toml
-expect 0 "sample before, as was asked for" "$program" check motion.toml --motion delayed
+expect 0 "sample before, as requested" "$program" check motion.toml --motion delayed
 model motion.toml 'model = "motion.mdl"\nmotion = "sideways"\n'
 expect 2 "motion.toml:2:" "$program" check motion.toml
 model still.mdl '@g ground 0.\n@m mass 1. 0. 0.\n@r spring @g @m 0.1\n@out1 posOutput @m\n'

@@ -63,10 +63,10 @@ std::string one_line(const std::string& text) {
 std::string header(const Identification& found, const std::string& source) {
   const std::size_t channels = found.sound.size();
   std::string text =
-      "# What rings in " + one_line(source) + ": " + counted(found.modes.size(), "mode", "modes") +
+      "# The modes of " + one_line(source) + ": " + counted(found.modes.size(), "mode", "modes") +
       ", from " + number("%.4g", found.analysed_s) + " s after the blow at " +
       number("%.4g", found.onset_s) +
-      " s.\n# Not explained by them: " + number("%.1f", found.residual_db) + " dB of all";
+      " s.\n# Residual without them: " + number("%.1f", found.residual_db) + " dB of all";
   const double quiet = -100.0;  // octaves below this level contain nothing to explain
   for (const OctaveResidual& octave : found.octaves) {
     if (octave.level_db > quiet) {

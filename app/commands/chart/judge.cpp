@@ -273,9 +273,9 @@ Result<References> find_references(const ChartScene& scene, const ChartScene& st
 
 Stress::Stress(const ChartScene& scene, Isa isa) : isa_(isa) {
   if (scene.has_contacts || scene.is_driven()) {
-    cases_.push_back({.name = "as it is", .scene = scene});
+    cases_.push_back({.name = "as written", .scene = scene});
   }
-  cases_.push_back({.name = "hit ten times harder", .scene = struck_harder(scene)});
+  cases_.push_back({.name = "struck ten times harder", .scene = struck_harder(scene)});
   for (Case& one : cases_) {
     const double seconds = stress_length_s(one.scene);
     if (auto fine = make_way(one.scene, direct_at(stress_times), seconds, isa_)) {

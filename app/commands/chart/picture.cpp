@@ -149,7 +149,7 @@ std::vector<plot::Series> legend_of(std::span<const ChartSheet> sheets) {
     add(floor_style, "accuracy of the reference");
   }
   if (has_failed) {
-    add(failed_style, "unstable when hit hard");
+    add(failed_style, "unstable when struck hard");
   }
   return legend;
 }

@@ -243,7 +243,7 @@ std::vector<std::string> missed(const Shaped& shaped) {
   const std::string why =
       !shaped.found.has_influence ? "no parameter changes it"
       : held.empty()
-          ? shaped.targets.size() > 1 ? "the targets conflict" : "the parameters reach no further"
+          ? shaped.targets.size() > 1 ? "the targets conflict" : "the parameters allow no more"
           : joined(held, ", ");
   std::vector<std::string> lines;
   for (std::size_t t = 0; t < shaped.targets.size(); ++t) {
@@ -254,9 +254,8 @@ std::vector<std::string> missed(const Shaped& shaped) {
     const AskedFigure figure = shaped.targets[t].figure;
     const double reached = *shaped.found.reached[static_cast<std::size_t>(figure)];
     const std::string word(noticed < 0.0 ? row_of(figure).more : row_of(figure).less);
-    lines.push_back("as " + word + " as it gets" +
-                    (shaped.targets.size() > 1 ? " with the rest" : "") + " is " +
-                    told(figure, reached) + ": " + why);
+    lines.push_back(told(figure, reached) + " is as " + word + " as it gets" +
+                    (shaped.targets.size() > 1 ? " with the other targets" : "") + ": " + why);
   }
   return lines;
 }

@@ -52,8 +52,8 @@ std::vector<ShapedParameter> changed(const Shaped& shaped, std::span<const doubl
 // Returns a table of target, start and result with the deviation, followed by missed().
 std::string to_text(const Shaped& shaped);
 
-// Returns a sentence for each target that was missed, with the reason: "as bright as it gets is
-// 1,412 Hz: m_K is at its highest".
+// Returns a sentence for each target that was missed, with the reason: "1,412 Hz is as bright as it
+// gets: m_K is at its highest".
 std::vector<std::string> missed(const Shaped& shaped);
 
 }  // namespace ressort::session

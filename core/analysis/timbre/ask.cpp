@@ -311,7 +311,7 @@ class Search {
         random_(options.seed) {}
 
   Result<AskedTimbre> run() {
-    options_.progress.stage("looking for the timbre");
+    options_.progress.stage("searching for the timbre");
     std::vector<MeterReader::Trial> far;
     int start = 0;
     for (; start < options_.starts && !is_there(); ++start) {
@@ -447,7 +447,7 @@ Result<AskedTimbre> ask_timbre(const AskedModel& model, std::span<const double> 
     return Error{"no parameter is free to change"};
   }
   if (targets.empty()) {
-    return Error{"nothing is asked for"};
+    return Error{"no target is given"};
   }
   for (const TimbreTarget& target : targets) {
     if (auto wrong = wrong_target(target)) {

@@ -82,7 +82,7 @@ std::string description(const Program&, const Shards& form) {
          (workers == 1       ? " shards one after the other"
           : workers < shards ? " shards, " + std::to_string(workers) + " at once"
                              : " shards at once") +
-         ", which meet every " + count_of(form.frames, "sample", "samples");
+         ", synchronised every " + count_of(form.frames, "sample", "samples");
 }
 
 std::uint64_t voice_bytes(const Program&, const Shards& form, std::uint64_t number_bytes) {

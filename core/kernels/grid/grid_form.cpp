@@ -517,7 +517,7 @@ double operations(const Program& program, const Grid& form, const Workload& load
 }
 
 std::string description(const Program&, const Grid& form) {
-  return std::string(form.segments.empty() ? "forces" : "rows that are alike") +
+  return std::string(form.segments.empty() ? "forces" : "rows of equal masses") +
          " in vectors along the index, " + count_of(form.rest_ends.size(), "link", "links") +
          " one by one";
 }

@@ -105,15 +105,15 @@ std::string description(const Program&, const Modes& form) {
   std::string text = count_of(form.modes, "mode", "modes");
   if (form.modes < form.of) {
     text = std::to_string(form.modes) + " of " + count_of(form.of, "mode", "modes") +
-           ", the rest at most " + in_db(form.left_out) + ",";
+           ", the omitted ones at most " + in_db(form.left_out) + ",";
   }
-  text += " in place of the masses, ";
+  text += " instead of masses, ";
   if (form.is_exact) {
-    text += "true to the continuous network, ";
+    text += "exact for the continuous network, ";
   }
-  text += count_of(form.places.size(), "place", "places") + " where links hold on";
+  text += count_of(form.places.size(), "place", "places") + " with links";
   if (form.silence > 0.0) {
-    text += ", asleep when all that sleep are below " + in_db(form.silence);
+    text += ", modes asleep while together below " + in_db(form.silence);
   }
   return text;
 }

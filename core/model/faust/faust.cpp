@@ -810,7 +810,7 @@ class Writer {
                                                                 parameter_, Tightness::product),
                                                   unit);
   }
-  // Terms of a force as terms of what it does to the mass's velocity.
+  // Converts the terms of a force to terms of the change of the mass's velocity.
   Words divided(Words force, const Mass& mass) {
     const Formula& formula = network_.arguments[mass.mass];
     if (mass.is_mode && !force.empty()) {
@@ -1239,7 +1239,7 @@ class Writer {
 
 Result<std::string> faust_text(const Network& network, const FaustOptions& options) {
   if (network.outputs.empty()) {
-    return Error{"the model has no output; FAUST takes no program without one", 1, 1};
+    return Error{"the model has no output; a FAUST program needs at least one", 1, 1};
   }
   Network expanded = join_springs(expand_macros(network), options.laws);
   if (auto refusal = faust_refusal(expanded, options.laws)) {

@@ -166,7 +166,7 @@ std::optional<Error> idle_keys(const Network& network, const Preset& preset) {
     const Input& input = network.inputs[i];
     why +=
         (i == 0 ? "" : ", ") + ("'@in" + std::to_string(input.number)) +
-        (input.is_force ? "' pushes what never moves" : "' moves no pluck, no bow and no contact");
+        (input.is_force ? "' pushes a mass that never moves" : "' moves no pluck, no bow and no contact");
   }
   if (network.inputs.size() > most_told) {
     why += ", nor do " + std::to_string(network.inputs.size() - most_told) + " more";

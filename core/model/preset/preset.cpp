@@ -459,7 +459,7 @@ void read_velocity_points(const toml::array& rows, TomlTable& reader, Preset& pr
   read_points(rows, reader,
               {.name = "velocity",
                .example = "[[0, 0], [127, 127]]",
-               .point = "[velocity, what it becomes]",
+               .point = "[velocity, new velocity]",
                .least = {0.0, 0.0},
                .most = {highest, highest},
                .bounds = "a velocity lies between 0 and 127"},

@@ -31,7 +31,7 @@ constexpr PresetKey keys[] = {
     {"", "motion", "`velocity` or `delayed`", "meaning of the last argument of a mass; overrides the model"},
     {"", "budget", "text", "accuracy, as for `--budget`: `cents=3 t60=5 silence=-60 passive=auto`"},
     {"", "parameters", "a table", "the model's parameters by name"},
-    {"", "control", "tables, one for each `[[control]]`", "what plays the model"},
+    {"", "control", "tables, one for each `[[control]]`", "the sources that play the model"},
     {"", "morph", "a table", "a path through several presets of one structure, with keys in tune"},
     {"parameters", "value", "a number", "start value; required"},
     {"parameters", "range", "[low, high]", "range of values; required"},

@@ -111,7 +111,7 @@ Result<Scale> parse_scale(std::string_view text) {
     scale.cents.push_back(*cents);
   }
   if (scale.cents.back() <= 0.0) {
-    return lines.expected("a last note above the first: the scale begins anew there");
+    return lines.expected("a last note above the first, at which the scale repeats");
   }
   return scale;
 }
@@ -131,7 +131,7 @@ Result<KeyboardMap> parse_keyboard_map(std::string_view text) {
                {map.first_key, 127, "the first key that is retuned"},
                {map.last_key, 127, "the last key that is retuned"},
                {map.middle_key, 127, "the key that plays step 0"},
-               {map.reference_key, 127, "the key of which the frequency is given"}};
+               {map.reference_key, 127, "the key whose frequency is given"}};
   for (const auto& head : heads) {
     lines.next();
     const auto value = number_of<int>(lines.word());
@@ -149,7 +149,7 @@ Result<KeyboardMap> parse_keyboard_map(std::string_view text) {
   lines.next();
   const auto octave = number_of<int>(lines.word());
   if (!octave || *octave < 0 || *octave > max_mapped_keys) {
-    return lines.expected("the step at which the map begins anew, 0 to " +
+    return lines.expected("the step at which the map repeats, 0 to " +
                           std::to_string(max_mapped_keys));
   }
   map.octave_steps = *octave;

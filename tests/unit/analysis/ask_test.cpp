@@ -290,7 +290,7 @@ TEST_CASE("invalid figures and models without free parameters are rejected", "[a
   CHECK(ask_timbre({any}, start, {}, bright, {}).error().message ==
         "no parameter is free to change");
   const FreeParameter one[] = {{0, 0.1, 0.3}};
-  CHECK(ask_timbre({any}, start, one, {}, {}).error().message == "nothing is asked for");
+  CHECK(ask_timbre({any}, start, one, {}, {}).error().message == "no target is given");
   // A parameter without influence keeps its value, and the result says so.
   const auto idle = ask_timbre({any}, start, one, bright, {});
   REQUIRE(idle);

@@ -92,7 +92,7 @@ TEST_CASE("The plan lists the connected components and their forms", "[compile]"
   }
   CHECK(describe(plan.parts).find("5 masses, 7 links") != std::string::npos);
   const Machine still = make_machine(network_of("@g ground 0."), 44100.0, true);
-  CHECK(describe(make_plan(still, {}).parts) == "nothing moves\n");
+  CHECK(describe(make_plan(still, {}).parts) == "no mass moves\n");
 }
 
 TEST_CASE("The plan chooses the form with the lowest worst-case cost", "[compile]") {

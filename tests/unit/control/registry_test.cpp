@@ -162,7 +162,7 @@ TEST_CASE("masses are struck by name, those of macros by number", "[registry]") 
     REQUIRE_FALSE(events);
     return events.error().message;
   };
-  CHECK(refused("/mass/s:1/strike") == "/mass/s:1/strike: s:1 is held, or nobody hears it");
+  CHECK(refused("/mass/s:1/strike") == "/mass/s:1/strike: s:1 is fixed, or no output hears it");
   const std::string there = ": the model has no such mass; it has a, s:1 to s:5, s:0.5";
   for (const std::string name :
        {"s", "s:", "s:0", "s:6", "s:x", "s:2x", "s:0.50", "a:1", "b", "", "far"}) {
@@ -178,7 +178,7 @@ TEST_CASE("a parameter driven by an input cannot be set", "[registry]") {
   REQUIRE(compiled);
   const auto one = to_events(call("/param/K 0.1"), compiled->instrument, 9);
   REQUIRE_FALSE(one);
-  CHECK(one.error().message == "/param/K: input 2 gives it, sample by sample; it cannot be set");
+  CHECK(one.error().message == "/param/K: input 2 sets it in every sample, so no message can");
   // A pattern skips read-only addresses.
   const auto all = to_events(call("/param/* 0.1"), compiled->instrument, 9);
   REQUIRE(all);
@@ -229,9 +229,9 @@ TEST_CASE("unplayable messages are reported with what was expected", "[registry]
               "/in/1/2/position: an input knows /position, /force, /pluck and /bow");
   check_error("/in/1/wiggle 0", "/in/1/wiggle: an input knows /position, /force, /pluck and /bow");
   check_error("/in/1/force 1",
-              "/in/1/force: input 1 takes a position, no force: use /in/N/position");
+              "/in/1/force: input 1 accepts a position, not a force: use /in/N/position");
   check_error("/in/3/position 1",
-              "/in/3/position: input 3 takes a force, no position: use /in/N/force");
+              "/in/3/position: input 3 accepts a force, not a position: use /in/N/force");
   check_error("/in/2/pluck 1", "/in/2/pluck: input 2 has no pluck in this preset");
   check_error("/in/1/bow 1", "/in/1/bow: input 1 has no bow in this preset");
   check_error("/in/1/pluck 2", "/in/1/pluck: the strength must lie between 0 and 1, found 2");

@@ -96,7 +96,7 @@ TEST_CASE("the option for the meaning overrides the text", "[motion]") {
       REQUIRE(parsed.ok());
       CHECK(parsed.network.third == third);
       CHECK(parsed.network.masses[0].third == parse_network(text).network.masses[0].third);
-      CHECK(parsed.motion.ends_with(", as was asked for"));
+      CHECK(parsed.motion.ends_with(", as requested"));
       CHECK(parse_network(text, {.third = third, .third_by = "the preset says"})
                 .motion.ends_with(", as the preset says"));
     }

@@ -328,8 +328,8 @@ TEST_CASE("the warning about a plan too large for one core says how many voices 
       "its one voice would take about 240 % of one core; to lower the load, use a smaller model, a "
       "lower rate, --precision float");
   CHECK(overload_warning(plan(2.4), 2, 48000.0, Precision::float32) ==
-        "all 2 voices would take about 240 % of one core, one alone about 120 % of one core; what "
-        "makes room: a smaller model, a lower rate");
+        "all 2 voices would take about 240 % of one core, one alone about 120 % of one core; to "
+        "lower the load, use a smaller model, a lower rate");
   CHECK(overload_warning(plan(0.89), 64, 48000.0, Precision::float64).empty());
   CHECK_FALSE(overload_warning(plan(0.89), 64, 96000.0, Precision::float64).empty());
 }
