@@ -99,14 +99,15 @@ TEST_CASE("SMPTE times ignore the tempo", "[midi_file]") {
         {0x90, 1, 1});
 }
 
-TEST_CASE("SysEx is passed on whole, in parts and escaped", "[midi_file]") {
+TEST_CASE("Whole, divided and escaped SysEx messages are passed on", "[midi_file]") {
   const MidiFile midi = read(
       // a complete exclusive message
-      header(0, 1, 96) + track(Bytes{0,  0xf0, 4, 0x7e, 0x7f, 9,    0xf7,
-                                     0,  0xf0, 2, 0x43, 0x12,  // the first part of one
-                                     96, 0xf7, 2, 0x01, 0xf7,  // its second and last part
-                                     0,  0xf7, 1, 0xf8, 0,    0x80, 1,    2} +  // a clock, escaped
-                               end));
+      header(0, 1, 96) +
+      track(Bytes{0,    0xf0, 4,    0x7e, 0x7f, 9,    0xf7, 0,
+                  0xf0, 2,    0x43, 0x12,                         // the first part of one
+                  96,   0xf7, 2,    0x01, 0xf7,                   // its second and last part
+                  0,    0xf7, 1,    0xf8, 0,    0x80, 1,    2} +  // a clock, escaped
+            end));
   REQUIRE(midi.messages.size() == 5);
   check(midi, 0, 0.0, {0xf0, 0x7e, 0x7f, 9, 0xf7});
   check(midi, 1, 0.0, {0xf0, 0x43, 0x12});

@@ -219,7 +219,7 @@ std::string random_body(std::uint64_t seed, std::size_t masses) {
 
 }  // namespace
 
-TEST_CASE("a triangle is held whole, its pick is walked", "[batch]") {
+TEST_CASE("the masses of a triangle stay in registers, and its pick is a link", "[batch]") {
   const Program program = formed(example("IPlayTheTriangle"));
   const auto& batch = program.form.get<Batch>();
   const auto is_held = [](const BatchSpring& spring) { return spring.stiffness != none; };
@@ -230,8 +230,7 @@ TEST_CASE("a triangle is held whole, its pick is walked", "[batch]") {
   CHECK(program.link_runs[batch.links[0].run].law == Law::pluck);
 }
 
-TEST_CASE("a second spring in the same place is no spring held, nor is any of more masses",
-          "[batch]") {
+TEST_CASE("parallel springs and networks of more masses do not stay in registers", "[batch]") {
   const std::string twice = scenes::triangle("0.1", "0.001") +
                             "@a springDamper @m_m0 @m_m1 0.01 0.\n@out1 posOutput @m_m0\n";
   const auto batch = batch_form(program_of(twice));
@@ -247,7 +246,7 @@ TEST_CASE("a second spring in the same place is no spring held, nor is any of mo
                   .has_value());
 }
 
-TEST_CASE("kernels share the voices evenly, and no pack is without any", "[batch]") {
+TEST_CASE("voices are distributed evenly over kernels, and no pack is empty", "[batch]") {
   for (const char* const name : {"PolyTriangle", "PhysicalLFO"}) {
     const Program program = formed(example(name));
     for (const Isa isa : isas()) {
@@ -262,19 +261,19 @@ TEST_CASE("kernels share the voices evenly, and no pack is without any", "[batch
   }
 }
 
-TEST_CASE("every voice of a choir is the voice alone", "[batch]") {
+TEST_CASE("each of many voices equals the voice alone", "[batch]") {
   check<double>(formed(example("PolyTriangle")), {}, 1e-12);
   check<float>(formed(example("PolyTriangle")), {}, 1e-5);
   check<double>(formed(example("IPlayTheTriangle")), {}, 1e-12);
   check<double>(formed(example("PhysicalLFO")), {}, 1e-12);
 }
 
-TEST_CASE("parameters are ramped in one voice, and the others do not hear it", "[batch]") {
+TEST_CASE("a parameter ramp in one voice does not affect the others", "[batch]") {
   check<double>(formed(example("PolyTriangle")), {.turns = true}, 1e-12);
   check<double>(formed(example("IPlayTheTriangle")), {.turns = true}, 1e-12);
 }
 
-TEST_CASE("bodies of every size, of any laws", "[batch]") {
+TEST_CASE("bodies of every size with any laws match the direct kernel", "[batch]") {
   for (std::uint64_t seed = 1; seed <= 27; ++seed) {
     const std::string text = random_body(seed, 1 + seed % 9);
     INFO("seed " << seed << "\n" << text);
@@ -321,7 +320,7 @@ TEST_CASE("hard contacts are passive in every voice", "[batch]") {
   }
 }
 
-TEST_CASE("a lane is put back, and the others play on", "[batch]") {
+TEST_CASE("a reset of one lane does not affect the others", "[batch]") {
   const Program program = formed(example("PolyTriangle"));
   Choir<double> choir(program, 16, best_isa());
   Choir<double> other(program, 16, best_isa());
@@ -339,7 +338,7 @@ TEST_CASE("a lane is put back, and the others play on", "[batch]") {
   }
 }
 
-TEST_CASE("one row for all voices is that row in each of them", "[batch]") {
+TEST_CASE("a common input row equals the same row in each voice", "[batch]") {
   std::vector<Program> programs;
   for (const char* const name : {"PolyTriangle", "IPlayTheTriangle", "PhysicalLFO"}) {
     programs.push_back(formed(example(name)));
@@ -370,7 +369,7 @@ TEST_CASE("one row for all voices is that row in each of them", "[batch]") {
   }
 }
 
-TEST_CASE("voices are the same whether others play behind them or not", "[batch]") {
+TEST_CASE("unused lanes do not change the other voices", "[batch]") {
   for (const char* const name : {"PolyTriangle", "IPlayTheTriangle", "PhysicalLFO"}) {
     const Program program = formed(example(name));
     for (const Isa isa : isas()) {

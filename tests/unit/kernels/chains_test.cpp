@@ -147,7 +147,7 @@ TEST_CASE("strings are found in any order of their lines", "[chains]") {
   }
 }
 
-TEST_CASE("what is no string is left as it is", "[chains]") {
+TEST_CASE("networks without strings have no chains form", "[chains]") {
   CHECK(!chains_form(program_of(scenes::iplay_the_triangle())));
   CHECK(!chains_form(program_of(scenes::mesh_20x30())));
   CHECK(!chains_form(program_of(row("a", 7, "mass 1.", "0.1 0.01"))));
@@ -171,7 +171,7 @@ TEST_CASE("what is no string is left as it is", "[chains]") {
   CHECK(ring->links.size() == 1);
 }
 
-TEST_CASE("the instruments' strings move as they are written", "[chains]") {
+TEST_CASE("the instruments' strings match the direct kernel", "[chains]") {
   for (const bool turns : {false, true}) {
     CAPTURE(turns);
     check_both(formed(scenes::resonator()), {.reach = 1.0, .turns = turns});
@@ -234,7 +234,7 @@ TEST_CASE("stiff strings are found in any order of their lines", "[chains]") {
   check_both(program, {.turns = true});
 }
 
-TEST_CASE("second springs that are not everywhere are left as they are", "[chains]") {
+TEST_CASE("incomplete second springs stay ordinary links", "[chains]") {
   std::string text = row("a", 40, "mass 1.", "0.2 0.01") + second_row("a", 40, "0.05");
   const std::string missing = "@a_s17 spring @a_m19 @a_m17 0.05\n";
   const std::size_t at = text.find(missing);
@@ -288,7 +288,7 @@ TEST_CASE("stiff strings of every length and every end fold into every pack", "[
   }
 }
 
-TEST_CASE("everything beside a string acts on it", "[chains]") {
+TEST_CASE("elements beside a string act on it", "[chains]") {
   // Two strings of different masses; a free mass and an oscillator between them; every smooth law;
   // gravity; force outputs at a mass in the middle, at an end, at a free mass, and at a node that
   // holds a string.
@@ -319,7 +319,7 @@ TEST_CASE("everything beside a string acts on it", "[chains]") {
 
 // One string between a position input and a ground stays in registers. Neighbours are in the same
 // pack or in different packs.
-TEST_CASE("everything beside a short string acts on it", "[chains]") {
+TEST_CASE("elements beside a short string act on it", "[chains]") {
   for (const int count : {9, 31, 32, 77, 160}) {
     CAPTURE(count);
     const auto at = [&](int part, int of) { return scenes::at("a_m", count * part / of); };
@@ -350,7 +350,7 @@ TEST_CASE("everything beside a short string acts on it", "[chains]") {
   }
 }
 
-TEST_CASE("what touches a string acts while it does", "[chains]") {
+TEST_CASE("contacts act on a string while they touch", "[chains]") {
   const Program program =
       formed(row("a", 40, "mass 1.", "0.2 0.01") +
              "@g ground 0.\n@s springDamper @g @a_m0 0.2 0.01\n@in1 posInput -0.2\n"
@@ -362,7 +362,7 @@ TEST_CASE("what touches a string acts while it does", "[chains]") {
                      1e-11, 200.0);
 }
 
-TEST_CASE("random strings tied to each other move as they are written", "[chains]") {
+TEST_CASE("random linked strings match the direct kernel", "[chains]") {
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     CAPTURE(seed);
     Random random(seed);
@@ -393,7 +393,7 @@ TEST_CASE("random strings tied to each other move as they are written", "[chains
   }
 }
 
-TEST_CASE("places on a string and beside it move and are moved", "[chains]") {
+TEST_CASE("places on a string and beside it transmit motion and force", "[chains]") {
   const std::string text =
       "@u param 0.3\n@s string 60 1. 0.2 0.01 0.0005 0. 0.\n@t chain 5 1. 0.1 0.01 0. 0.\n"
       "@in1 posInput 0.\n@in2 frcInput [@s u]\n@in3 frcInput [@t u]\n"
@@ -409,14 +409,14 @@ TEST_CASE("places on a string and beside it move and are moved", "[chains]") {
   CHECK(!chains_form(program_of(text + "@out3 frcOutput @in1\n")));
 }
 
-TEST_CASE("a stiffness that audio gives acts sample by sample", "[chains]") {
+TEST_CASE("a stiffness driven by audio acts in every sample", "[chains]") {
   const Program program = formed("@k audioParam @in2\n" + row("a", 20, "mass 1.", "k 0.01") +
                                  "@in1 frcInput @a_m4\n@out1 posOutput @a_m16\n");
   REQUIRE(program.audio_coefficients.size() == 1);
   check_same<double>(program, {.frames = 2560}, 1e-12, 200.0);
 }
 
-TEST_CASE("a reset string starts over, whatever became of it", "[chains]") {
+TEST_CASE("a reset string restarts from any state", "[chains]") {
   const Program program = formed(scenes::resonator());
   support::Bare<float> used(program);
   support::Bare<float> fresh(program);

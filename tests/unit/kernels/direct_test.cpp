@@ -65,7 +65,7 @@ class Hands {
 
 }  // namespace
 
-TEST_CASE("the laws give what their formulas give by hand", "[direct]") {
+TEST_CASE("the laws match values computed by hand", "[direct]") {
   // Values printed by mi.lib itself; the force on a is -f.
   const double deltas[] = {.005, .0099, .01, .05, .099, .1, -.005, -.05};
   const double on_a[] = {.0045, .00891, .009, .005, .0001, 0, -.0045, -.005};
@@ -117,7 +117,7 @@ TEST_CASE("a bow grips hardest at a third of its speed, a smooth one at s/sqrt 8
   CHECK(steepest / 1e-9 == Approx(1.0387 * z).epsilon(1e-4));
 }
 
-TEST_CASE("a bow may be turned from one profile to the other", "[direct]") {
+TEST_CASE("the profile of a bow can change while it plays", "[direct]") {
   for (int i = -30; i <= 30; ++i) {
     const double v = 0.05 * i / 20.0;
     for (const double profile : {-1.0, 0.0, 1e-9, 0.5, 1.0, 7.0}) {
@@ -140,7 +140,7 @@ TEST_CASE("the scenes have the published sizes", "[direct]") {
   }
 }
 
-TEST_CASE("the kernel is the textbook simulator for all nine instruments over a second",
+TEST_CASE("the direct kernel matches the textbook simulator for all nine instruments over a second",
           "[direct]") {
   for (const Example& example : scenes::nine_instruments()) {
     const Network network = network_of(example.text);
@@ -164,7 +164,8 @@ TEST_CASE("the kernel is the textbook simulator for all nine instruments over a 
   }
 }
 
-TEST_CASE("so it is for every law and every start that the nine do not have", "[direct]") {
+TEST_CASE("the direct kernel matches the textbook simulator for all other laws and initial states",
+          "[direct]") {
   // Damped plucks, smooth bows, thresholds, oscillators, unequal masses, speeds at the start.
   const Network network = network_of(
       "@k param 0.05\n@g ground 0.3\n@in1 posInput 0.5\n@in2 frcInput @o\n"
@@ -198,8 +199,9 @@ TEST_CASE("so it is for every law and every start that the nine do not have", "[
   CHECK(channels[4].worst == 0.0);
 }
 
-TEST_CASE("nonlinear springs, clipped contacts, gravity and force outputs equal the textbook's",
-          "[direct]") {
+TEST_CASE(
+    "nonlinear springs, clipped contacts, gravity and force outputs match the textbook simulator",
+    "[direct]") {
   // Both meanings of gravity, a limiter that clips in both directions, and reaction forces at a
   // position input and at a ground.
   for (const char* const text :
@@ -238,7 +240,7 @@ TEST_CASE("nonlinear springs, clipped contacts, gravity and force outputs equal 
   }
 }
 
-TEST_CASE("the limiting spring is continuous where it clips", "[direct]") {
+TEST_CASE("a clipped spring is continuous at its clip", "[direct]") {
   // b = sqrt((k - s)/c) = sqrt(0.49/10) = 0.2213594: the force on both sides, by hand.
   const auto force = [](double d) {
     const laws::ClippedSpring<V> spring{lanes(0.01), lanes(10.0), lanes(0.5), V{}};
@@ -251,7 +253,7 @@ TEST_CASE("the limiting spring is continuous where it clips", "[direct]") {
   CHECK(force(-1.0) == Approx(-0.5).epsilon(1e-14));
 }
 
-TEST_CASE("single precision keeps 90 dB over a second on what is linear", "[direct]") {
+TEST_CASE("single precision keeps 90 dB over a second in linear networks", "[direct]") {
   for (const Example& example : scenes::nine_instruments()) {
     if (!example.is_linear) {
       continue;
@@ -276,7 +278,7 @@ TEST_CASE("single precision keeps 90 dB over a second on what is linear", "[dire
   }
 }
 
-TEST_CASE("voices in neighbouring lanes do not hear each other", "[direct]") {
+TEST_CASE("voices in neighbouring lanes do not affect each other", "[direct]") {
   for (const Example& example : scenes::nine_instruments()) {
     CAPTURE(example.name);
     const Network network = network_of(example.text);

@@ -90,7 +90,7 @@ TEST_CASE("A square mesh is one segment with four neighbours", "[grid]") {
   CHECK(ends == 2 * 1150 - 4);  // both grounds are corners
 }
 
-TEST_CASE("Instruments are grids, and sound the same", "[grid]") {
+TEST_CASE("Instruments become grids and match the direct kernel", "[grid]") {
   const auto options = [](double reach, std::size_t frames) {
     return ComparisonOptions{.frames = frames, .reach = reach, .turns = true, .pitch = 0.8};
   };
@@ -111,7 +111,8 @@ TEST_CASE("Instruments are grids, and sound the same", "[grid]") {
   }
 }
 
-TEST_CASE("A triangle mesh has six neighbours, and a large one a segment for every row", "[grid]") {
+TEST_CASE("A mass of a triangle mesh has six neighbours, and a large mesh has one segment per row",
+          "[grid]") {
   const std::string hands = "@in1 frcInput @t_m5_6\n@out1 posOutput @t_m7_7\n";
   const Program program = formed(scenes::triangle_mesh("t", 60, "0.1", "0.001") + hands);
   const Grid& grid = grid_of(program);
@@ -142,7 +143,7 @@ TEST_CASE("The order of the text does not matter", "[grid]") {
   }
 }
 
-TEST_CASE("Any law may be on every link", "[grid]") {
+TEST_CASE("Every link of a grid may have any law", "[grid]") {
   const std::string mesh = scenes::square_mesh("m", 12, 15, "0.1", "0.01") +
                            "@in1 frcInput @m_m5_6\n@out1 posOutput @m_m7_7\n";
   struct Row {
@@ -162,7 +163,7 @@ TEST_CASE("Any law may be on every link", "[grid]") {
   }
 }
 
-TEST_CASE("Macros are grids with points on them", "[grid]") {
+TEST_CASE("Macros become grids with points on them", "[grid]") {
   const std::string ends = "@u param 0.3\n@in1 frcInput [@s u 0.5]\n@out1 posOutput [@s 0.75 u]\n";
   const std::string line_ends = "@u param 0.3\n@in1 frcInput [@s u]\n@out1 posOutput [@s 0.75]\n";
   const std::string text = GENERATE_COPY(
@@ -174,7 +175,7 @@ TEST_CASE("Macros are grids with points on them", "[grid]") {
   same_as_direct(formed(text), {.frames = 8820, .turns = true}, 1e-11, 90.0);
 }
 
-TEST_CASE("Grounds away from 0 are where they are needed", "[grid]") {
+TEST_CASE("Grounds away from 0 are copied to the slots that need them", "[grid]") {
   const std::string mesh = scenes::square_mesh("m", 12, 15, "0.1", "0.01");
   std::string text;
   for (std::size_t at = 0; at < mesh.size();) {
@@ -195,7 +196,7 @@ TEST_CASE("Grounds away from 0 are where they are needed", "[grid]") {
   same_as_direct(cubic, {.frames = 8820, .turns = true}, 1e-11, 80.0);
 }
 
-TEST_CASE("Networks that are regular but for a few things", "[grid]") {
+TEST_CASE("Networks with a few irregularities become grids", "[grid]") {
   // Masses that oscillate and fall, some links left out, some additional links between random
   // masses, and a hammer.
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
@@ -228,7 +229,7 @@ TEST_CASE("Networks that are regular but for a few things", "[grid]") {
   }
 }
 
-TEST_CASE("Strings of several kinds all move", "[grid]") {
+TEST_CASE("Strings of several kinds in one grid match the direct kernel", "[grid]") {
   for (const int longer : {10, 70, 100, 300}) {
     for (const int shorter : {9, 16, 40}) {
       INFO(longer << " and " << shorter << " masses");
@@ -252,7 +253,7 @@ TEST_CASE("Strings of several kinds all move", "[grid]") {
   }
 }
 
-TEST_CASE("What closes a ring is no offset of all of it", "[grid]") {
+TEST_CASE("The link that closes a ring is computed separately", "[grid]") {
   // Each mass would add two empty slots to its sum, and float would lose precision in its position.
   std::string text = "@k param 0.01\n@g ground 0.\n";
   for (int i = 0; i < 29; ++i) {
@@ -266,7 +267,7 @@ TEST_CASE("What closes a ring is no offset of all of it", "[grid]") {
   same_as_direct(program, {.frames = 20000}, 1e-12, 115.0);
 }
 
-TEST_CASE("A grid begins again as it began", "[grid]") {
+TEST_CASE("A reset grid repeats its motion", "[grid]") {
   for (const std::string keyword : {"springDamper", "nlSpring3"}) {
     const Program program =
         formed(with_law(scenes::mesh_20x30(), keyword,
@@ -285,7 +286,7 @@ TEST_CASE("A grid begins again as it began", "[grid]") {
   }
 }
 
-TEST_CASE("What is not regular is no grid", "[grid]") {
+TEST_CASE("Irregular networks have no grid form", "[grid]") {
   std::string star = "@hub mass 1. 0. 0.\n";
   std::string pairs;
   for (int i = 0; i < 100; ++i) {

@@ -162,7 +162,7 @@ TEST_CASE("a network in shards is struck before its first step", "[halo]") {
   }
 }
 
-TEST_CASE("points on macros and what has no order are divided too", "[halo]") {
+TEST_CASE("points on macros and unordered networks are divided too", "[halo]") {
   ThreadPool executor(3);
   const std::string macro =
       "@k param 0.2\n@p closedMesh 45 46 1. k 0.003 0. 0.\n@in1 frcInput [@p 0.49 0.3]\n"
@@ -199,7 +199,7 @@ TEST_CASE("points on macros and what has no order are divided too", "[halo]") {
   }
 }
 
-TEST_CASE("chains and grids in shards are held to the direct form", "[halo]") {
+TEST_CASE("chains and grids in shards match the direct form", "[halo]") {
   ThreadPool executor(3);
   ComparisonOptions options{.frames = 8820, .seed = 5, .reach = 0.05};
   const auto check = [&](const std::string& text, const std::string& forces, const auto& all_cuts,
@@ -233,7 +233,7 @@ TEST_CASE("chains and grids in shards are held to the direct form", "[halo]") {
   }
 }
 
-TEST_CASE("a grid with a law on every link goes on in shards", "[halo]") {
+TEST_CASE("a grid with a law on every link is divided into shards", "[halo]") {
   ThreadPool executor(2);
   const Program program = program_of(
       "@k param 0.1\n@p closedMesh 45 45 1. k 0.003 0. 0.\n@in1 frcInput [@p 0.3 0.31]\n"
@@ -253,7 +253,7 @@ TEST_CASE("a grid with a law on every link goes on in shards", "[halo]") {
 }
 
 // At K = M a wave on a string has the highest possible speed, one link per sample.
-TEST_CASE("a wave goes over the cut as if it were not there", "[halo]") {
+TEST_CASE("a wave passes from one shard to the next unchanged", "[halo]") {
   ThreadPool executor(2);
   const Program program =
       program_of(scenes::string("s", 600, "1", "0") +
@@ -312,7 +312,7 @@ TEST_CASE("shards do not drift", "[halo]") {
   CHECK(last_second.relative() < 1e-11);
 }
 
-TEST_CASE("a network is shared out where that pays", "[halo]") {
+TEST_CASE("a network is divided into shards if that pays", "[halo]") {
   ThreadPool executor(2);
   const auto planned = [&](const std::string& text, Executor* helpers,
                            std::optional<Method> method) {
@@ -344,7 +344,7 @@ TEST_CASE("a network is shared out where that pays", "[halo]") {
   CHECK(planned(string + "@in1 frcInput [@s 0.5]\n", &executor, {}) == 2);
 }
 
-TEST_CASE("one core steps a network in shards where its caches do not hold it", "[halo]") {
+TEST_CASE("one core steps a network in shards if it exceeds the caches", "[halo]") {
   const std::string text =
       "@s string 300000 1. 0.1 0.001 0. 0. 0.\n@in1 frcInput [@s 0.2]\n"
       "@out1 posOutput [@s 0.20001]\n@out2 posOutput [@s 0.2]\n";
@@ -378,7 +378,7 @@ TEST_CASE("one core steps a network in shards where its caches do not hold it", 
   CHECK(comparison.relative() < 1e-13);
 }
 
-TEST_CASE("kernels in shards are placed and saved as one", "[halo]") {
+TEST_CASE("set_state and save work for kernels in shards", "[halo]") {
   ThreadPool executor(2);
   const Program program = program_of(chain_scene());
   const Program cut = sharded(program, {2, 16}, executor, as_chains);

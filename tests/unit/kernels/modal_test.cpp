@@ -38,7 +38,7 @@ void check_same(const Program& program, const ComparisonOptions& options, double
   }
 }
 
-TEST_CASE("The modes of a string are those of the textbook", "[modal]") {
+TEST_CASE("The modes of a string follow the closed form", "[modal]") {
   const Program program = modal_program(scenes::string("s", 20, "0.1", "0.01") +
                                         "@in1 frcInput @s_m0\n" + scenes::output(1, "s_m4"));
   const Modes& modes = modes_of(program);
@@ -54,7 +54,7 @@ TEST_CASE("The modes of a string are those of the textbook", "[modal]") {
   CHECK(modes.stiffness[0].factor == modes.damping[0].factor);
 }
 
-TEST_CASE("Modes of a body cost nothing to each other", "[modal]") {
+TEST_CASE("Modes of a body are independent of each other", "[modal]") {
   // Each mode's decay is a coefficient of its own that changes only this mode, so the form stores
   // as many numbers as modes, not their square.
   std::string text = "@ring param 1.\n@b body 1. p\n";
@@ -74,7 +74,7 @@ TEST_CASE("Modes of a body cost nothing to each other", "[modal]") {
   CHECK(std::all_of(turned.begin(), turned.end(), [](int times) { return times == 1; }));
 }
 
-TEST_CASE("Modes that no one hears are left out", "[modal]") {
+TEST_CASE("Inaudible modes are left out", "[modal]") {
   // The middle of a string of 21 is a node of every even mode. Strikes at other places excite these
   // modes.
   const std::string string = scenes::string("s", 21, "0.1", "0.01");
@@ -84,7 +84,7 @@ TEST_CASE("Modes that no one hears are left out", "[modal]") {
             .modes == 21);
 }
 
-TEST_CASE("What does not share its eigenvectors is refused", "[modal]") {
+TEST_CASE("Networks without common eigenvectors have no modal form", "[modal]") {
   CHECK(has_modes(scenes::mesh_20x30()));
   // The springs at the triangle's corner have another ratio of K and Z than those at its sides.
   CHECK_FALSE(has_modes(scenes::iplay_the_triangle()));
@@ -97,7 +97,7 @@ TEST_CASE("What does not share its eigenvectors is refused", "[modal]") {
   CHECK_FALSE(has_modes(two + "@r spring @g @a K\n@s spring @a @b 0.2\n"));
 }
 
-TEST_CASE("A mesh in its modes sounds as mass by mass", "[modal]") {
+TEST_CASE("A mesh with modes matches the direct kernel", "[modal]") {
   const Program program = modal_program(scenes::mesh_20x30());
   for (const bool turns : {false, true}) {
     check_same<double>(program, {.turns = turns, .pitch = 0.7}, 1e-9);
@@ -113,7 +113,7 @@ TEST_CASE("A mesh in its modes sounds as mass by mass", "[modal]") {
   }
 }
 
-TEST_CASE("A hand on springs shakes the modes", "[modal]") {
+TEST_CASE("A position input on springs drives the modes", "[modal]") {
   const Program program = modal_program(scenes::resonator());
   for (const bool turns : {false, true}) {
     check_same<double>(program, {.reach = 1.0, .turns = turns}, 1e-9);
@@ -121,7 +121,7 @@ TEST_CASE("A hand on springs shakes the modes", "[modal]") {
   }
 }
 
-TEST_CASE("Masses, grounds, gravity and offsets are where they were", "[modal]") {
+TEST_CASE("Masses, grounds, gravity and offsets keep their positions with modes", "[modal]") {
   const std::vector<std::string> scenes = {
       // Different masses; a ground and a position input away from 0.
       "@K param 0.1\n@Z param 0.01\n@g ground 1.\n@in1 posInput 1.5\n"
@@ -159,7 +159,7 @@ std::string touched_mesh() {
          scenes::output(1, "m_m3_3") + scenes::output(2, "m_m7_1");
 }
 
-TEST_CASE("Nonlinear links act on the modes as on the masses", "[modal]") {
+TEST_CASE("Nonlinear links act on modes as on masses", "[modal]") {
   const Program program = modal_program(touched_mesh());
   for (const bool turns : {false, true}) {
     for (const double reach : {0.02, 0.06, 0.2}) {
@@ -172,7 +172,7 @@ TEST_CASE("Nonlinear links act on the modes as on the masses", "[modal]") {
   }
 }
 
-TEST_CASE("A blow is felt far away within the block that it falls in", "[modal]") {
+TEST_CASE("A strike acts on distant links within its block", "[modal]") {
   // A hard finger strikes one end of a light chain at rest; the other end is close to the ground
   // and hits it at once.
   const std::string text =
@@ -188,14 +188,14 @@ TEST_CASE("A blow is felt far away within the block that it falls in", "[modal]"
   }
 }
 
-TEST_CASE("Where the energy promises nothing, links are looked at all the same", "[modal]") {
+TEST_CASE("Links are tested even if the energy gives no bound", "[modal]") {
   const Program program = modal_program(
       "@g ground 0.\n@in1 posInput 0.01\n@a mass 1. 0.01 0.\n@h spring @g @a 3.98\n"
       "@t contact @a @in1 0.001 0. 0.\n@out1 posOutput @a\n");
   check_same<double>(program, {.frames = 2000, .reach = 0.1, .highest_hz = 100.0}, 1e-9);
 }
 
-TEST_CASE("A voice in its modes starts again as it started", "[modal]") {
+TEST_CASE("A reset voice with modes repeats its motion", "[modal]") {
   support::Bare<double> bare(modal_program(touched_mesh()));
   const auto play = [&] {
     std::vector<double> heard;
@@ -214,7 +214,7 @@ TEST_CASE("A voice in its modes starts again as it started", "[modal]") {
   CHECK(play() == first);
 }
 
-TEST_CASE("More links than one sweep takes along", "[modal]") {
+TEST_CASE("More links than one sweep has rows are computed correctly", "[modal]") {
   std::string text =
       scenes::string("s", 40, "0.1", "0.01") + "@in1 posInput 0.\n@ceiling ground 0.5\n";
   for (int i = 0; i < 12; ++i) {
@@ -236,7 +236,7 @@ TEST_CASE("More links than one sweep takes along", "[modal]") {
   }
 }
 
-TEST_CASE("The large mesh is plucked and touched in its modes", "[modal]") {
+TEST_CASE("The large mesh is plucked and touched with modes", "[modal]") {
   const Program program = modal_program(scenes::large_triangle_mesh());
   CHECK(modes_of(program).places.size() == 7);
   check_same<double>(program, {.frames = 3000, .reach = 0.06}, 1e-9);

@@ -90,7 +90,7 @@ class Pair {
   double peak() const { return peak_; }
   double worst() const { return worst_; }
   double most_owed() const { return most_owed_; }
-  double excess() const { return excess_; }  // largest ratio of error to bound
+  double excess() const { return excess_; }    // largest ratio of error to bound
   double reduced() const { return reduced_; }  // the same, compared with all modes of the network
   const Program& program() const { return program_; }
   const Modes& form() const { return program_.form.get<Modes>(); }
@@ -129,7 +129,7 @@ double reach_of_a_blow(const std::string& text) {
   return most;
 }
 
-TEST_CASE("A struck mesh needs twelve modes of six hundred", "[modes_asleep]") {
+TEST_CASE("A struck mesh keeps twelve of six hundred modes awake", "[modes_asleep]") {
   const std::string struck = model("20x30mesh.mdl");
   const double reach = reach_of_a_blow(struck);
   for (const Isa isa : isas()) {
@@ -149,7 +149,7 @@ TEST_CASE("A struck mesh needs twelve modes of six hundred", "[modes_asleep]") {
   }
 }
 
-TEST_CASE("The fewer decibels, the fewer modes", "[modes_asleep]") {
+TEST_CASE("A smaller silence budget keeps fewer modes awake", "[modes_asleep]") {
   const double reach = reach_of_a_blow(model("20x30mesh.mdl"));
   double before = 0.0;
   for (const double silence : {-40.0, -60.0, -80.0, -100.0}) {
@@ -163,7 +163,7 @@ TEST_CASE("The fewer decibels, the fewer modes", "[modes_asleep]") {
   }
 }
 
-TEST_CASE("A blow wakes all modes in its own sample", "[modes_asleep]") {
+TEST_CASE("A strike wakes all modes in its own sample", "[modes_asleep]") {
   Pair mesh(model("20x30mesh.mdl"), -60.0);
   mesh.play({{1.0}});
   for (const std::size_t wait : {30000u, 12345u, 7u, 20001u}) {
@@ -179,7 +179,7 @@ TEST_CASE("A blow wakes all modes in its own sample", "[modes_asleep]") {
   CHECK(mesh.excess() < 1e-12);
 }
 
-TEST_CASE("Parameters and pitch may be turned while modes sleep", "[modes_asleep]") {
+TEST_CASE("Parameters and pitch may change while modes sleep", "[modes_asleep]") {
   Pair mesh(model("20x30mesh.mdl"), -60.0);
   mesh.play({{1.0}});
   mesh.rest(20000);
@@ -206,7 +206,7 @@ std::string touched_mesh() {
          scenes::output(1, "m_m3_3") + scenes::output(2, "m_m7_1");
 }
 
-TEST_CASE("A touch wakes modes as a blow does", "[modes_asleep]") {
+TEST_CASE("A contact wakes modes like a strike", "[modes_asleep]") {
   for (const Isa isa : isas()) {
     Pair mesh(touched_mesh(), -60.0, isa);
     double finger = 1.0;
@@ -229,7 +229,7 @@ TEST_CASE("A touch wakes modes as a blow does", "[modes_asleep]") {
   }
 }
 
-TEST_CASE("In float as in double", "[modes_asleep]") {
+TEST_CASE("Sleeping modes keep the bound in float and in double", "[modes_asleep]") {
   Pair<float> mesh(model("20x30mesh.mdl"), -60.0);
   mesh.play({{1.0}});
   mesh.rest(44099);
@@ -237,7 +237,7 @@ TEST_CASE("In float as in double", "[modes_asleep]") {
   CHECK(mesh.excess() < 1e-6 * mesh.peak());
 }
 
-TEST_CASE("Exact modes sleep as well", "[modes_asleep]") {
+TEST_CASE("Exact modes sleep, too", "[modes_asleep]") {
   const std::string text = model("20x30mesh.mdl");
   Program full = make_program(network_of(text), 44100.0, true);
   Program sleepy = full;
@@ -267,7 +267,7 @@ TEST_CASE("Exact modes sleep as well", "[modes_asleep]") {
   CHECK(sum / 44100.0 < 14.0);
 }
 
-TEST_CASE("Without a budget nothing sleeps", "[modes_asleep]") {
+TEST_CASE("Without a budget no mode sleeps", "[modes_asleep]") {
   Pair mesh(model("20x30mesh.mdl"), -Budget::unlimited);
   mesh.play({{1.0}});
   mesh.rest(20000);
@@ -275,7 +275,7 @@ TEST_CASE("Without a budget nothing sleeps", "[modes_asleep]") {
   CHECK(mesh.worst() == 0.0);
 }
 
-TEST_CASE("A voice that starts again has forgotten who slept", "[modes_asleep]") {
+TEST_CASE("A reset voice has all modes awake", "[modes_asleep]") {
   support::Bare<double> bare(in_modes(model("20x30mesh.mdl"), -60.0));
   const auto play = [&] {
     std::vector<double> heard;

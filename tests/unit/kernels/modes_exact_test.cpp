@@ -52,7 +52,7 @@ double damped_cosine(double k, double z, double a, double b, double n) {
 }
 
 struct Pole {
-  double cents = 0.0;  // relative to the continuous oscillator
+  double cents = 0.0;        // relative to the continuous oscillator
   double t60_percent = 0.0;  // how much longer than that of the continuous oscillator, in percent
 };
 
@@ -74,7 +74,7 @@ Pole pole_of(const std::vector<double>& x, double k, double z) {
   return {1200.0 * std::log2(angle / wanted), 100.0 * (-z / std::log(b) - 1.0)};
 }
 
-TEST_CASE("One oscillator is in tune and dies when it should", "[modes_exact]") {
+TEST_CASE("An exact oscillator has its pitch and its decay", "[modes_exact]") {
   for (const auto& [k, z] : {std::pair{0.1, 0.001}, {1.0, 0.0001}, {2.0, 0.01}, {3.9, 0.01}}) {
     const std::string text = "@a osc 1. " + show(k) + " " + show(z) + " 1. 1.\n" +
                              "@in1 frcInput @a\n@out1 posOutput @a\n";
@@ -132,7 +132,7 @@ std::vector<double> ringing_string(const Program& program, std::uint32_t heard, 
   return x;
 }
 
-TEST_CASE("A string is the sum of its damped cosines", "[modes_exact]") {
+TEST_CASE("A string with exact modes is the sum of its damped cosines", "[modes_exact]") {
   struct Case {
     int count;
     double k, z;
@@ -156,7 +156,7 @@ TEST_CASE("A string is the sum of its damped cosines", "[modes_exact]") {
   }
 }
 
-TEST_CASE("In float the exact modes are as clean as the published ones", "[modes_exact]") {
+TEST_CASE("Exact modes are as accurate in float as the published scheme", "[modes_exact]") {
   const std::string text = thrown_string(50, 0.1, 0.001);
   const auto noise = [&](const Budget& budget) {
     const Program program = in_modes(text, budget);
@@ -175,7 +175,7 @@ TEST_CASE("In float the exact modes are as clean as the published ones", "[modes
   CHECK(exact > published - 6.0);
 }
 
-TEST_CASE("A force that stays bends exact modes as far as springs allow", "[modes_exact]") {
+TEST_CASE("A constant force moves exact modes to the static deflection", "[modes_exact]") {
   const std::string text =
       scenes::string("s", 5, "0.8", "0.2") + "@in1 frcInput @s_m2\n" + scenes::output(1, "s_m2");
   Fighter<double> fighter(in_modes(text, physical), 1.0, best_isa());
@@ -211,7 +211,7 @@ std::vector<double> finely(double k, double z, double to, std::size_t from, std:
   return heard;
 }
 
-TEST_CASE("Exact modes follow a stiffness that is turned", "[modes_exact]") {
+TEST_CASE("Exact modes follow a changing stiffness", "[modes_exact]") {
   constexpr std::size_t frames = 3000;
   constexpr std::size_t from = 600;
   const std::string text = "@K param 0.1\n@Z param 0.001\n@a osc 1. K Z 1. 1.\n" +
@@ -243,7 +243,8 @@ TEST_CASE("Exact modes follow a stiffness that is turned", "[modes_exact]") {
   CHECK(snr(play({})) < 10.0);
 }
 
-TEST_CASE("The plan takes exact modes where the published scheme is too far off", "[modes_exact]") {
+TEST_CASE("The plan chooses exact modes if the published scheme exceeds the budget",
+          "[modes_exact]") {
   const auto plan_for = [](const std::string& stiffness, const Budget& budget) {
     const Network network = network_of(scenes::string("s", 50, stiffness, "0.0001") +
                                        "@in1 frcInput @s_m4\n" + scenes::output(1, "s_m9"));
@@ -260,7 +261,7 @@ TEST_CASE("The plan takes exact modes where the published scheme is too far off"
   CHECK_FALSE(plan_for("0.1", {}).first);
 }
 
-TEST_CASE("How far off the published scheme is", "[modes_exact]") {
+TEST_CASE("The errors of the published scheme match theory", "[modes_exact]") {
   const auto of = [](const std::string& stiffness, const std::string& damping) {
     const Program program = support::program_of(scenes::string("s", 50, stiffness, damping) +
                                                 scenes::output(1, "s_m9"));

@@ -170,7 +170,7 @@ void check_network(const Program& program, double silence_db, Random& random, Ta
   tally.slept += has_slept;
 }
 
-TEST_CASE("What is left out of a random network is never more than told", "[modes_left_out]") {
+TEST_CASE("Omitted modes of random networks stay below the reported bound", "[modes_left_out]") {
   Tally tally;
   for (std::uint64_t seed = 1; tally.networks < 200; ++seed) {
     REQUIRE(seed < 3000);
@@ -262,7 +262,7 @@ std::vector<double> heard_of(const Program& program, std::size_t frames) {
   return heard;
 }
 
-TEST_CASE("A contact feels the modes that are left out give way", "[modes_left_out]") {
+TEST_CASE("A contact includes the compliance of omitted modes", "[modes_left_out]") {
   Program full = make_program(network_of(string_over_a_wall(2.0)), 44100.0, true);
   full.form = *modal_form(full);
   REQUIRE(full.form.get<Modes>().modes == 50);
@@ -278,7 +278,7 @@ TEST_CASE("A contact feels the modes that are left out give way", "[modes_left_o
   }
 }
 
-TEST_CASE("Without a budget every mode that is heard is there", "[modes_left_out]") {
+TEST_CASE("Without a budget all audible modes are kept", "[modes_left_out]") {
   const Program program = make_program(network_of(scenes::mesh_20x30()), 44100.0, true);
   const Modes all = *modal_form(program);
   const Modes some = *modal_form(program, {.silence_db = -30.0});

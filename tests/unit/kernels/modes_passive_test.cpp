@@ -24,7 +24,7 @@ std::string touched_mesh() {
          scenes::output(1, "m_m3_3") + scenes::output(2, "m_m7_1") + scenes::output(3, "m_m2_3");
 }
 
-TEST_CASE("Passive links act on the modes as on the masses", "[modes_passive]") {
+TEST_CASE("Passive links act on modes as on masses", "[modes_passive]") {
   const Program program = in_modes(touched_mesh(), Passivity::always);
   REQUIRE(!is_plain(program));
   for (const bool turns : {false, true}) {
@@ -51,7 +51,7 @@ std::string held_mesh(double k, double z) {
          scenes::output(2, "m_m7_1");
 }
 
-TEST_CASE("Contacts that stay inside act on the modes as on the masses", "[modes_passive]") {
+TEST_CASE("Contacts that stay closed act on modes as on masses", "[modes_passive]") {
   for (const auto& [k, z] : {std::pair{0.0, 0.01}, std::pair{0.05, 0.0}, std::pair{3.0, 0.5}}) {
     CAPTURE(k, z);
     const Program program = in_modes(held_mesh(k, z), Passivity::always);
@@ -75,7 +75,7 @@ std::string busy_string() {
          scenes::output(1, "s_m4") + scenes::output(2, "s_m17") + scenes::output(3, "s_m29");
 }
 
-TEST_CASE("Passive links of all laws share a body", "[modes_passive]") {
+TEST_CASE("Passive links of all laws act on one body", "[modes_passive]") {
   const Program program = in_modes(busy_string(), Passivity::always);
   for (const bool turns : {false, true}) {
     for (const std::uint64_t seed : {1u, 2u, 3u}) {
@@ -141,7 +141,7 @@ struct Lossless {
   }
 };
 
-TEST_CASE("Hard contacts on modes make no energy in a million samples", "[modes_passive]") {
+TEST_CASE("Hard contacts on modes gain no energy in a million samples", "[modes_passive]") {
   const auto samples = support::of_all<std::size_t>(200'000, 1'000'000);
   for (const Budget& budget : {Budget{}, Budget{.cents = 1e-6}}) {
     const Program program = in_modes(Lossless().text(), Passivity::always, budget);
@@ -177,11 +177,11 @@ TEST_CASE("Hard contacts on modes make no energy in a million samples", "[modes_
   }
 }
 
-TEST_CASE("The contacts on modes are those on masses, for 5 ms", "[modes_passive]") {
+TEST_CASE("Contacts on modes equal those on masses for 5 ms", "[modes_passive]") {
   check_same<double>(in_modes(Lossless().text(), Passivity::always), {.frames = 220}, 1e-11);
 }
 
-TEST_CASE("Modes sleep while no passive link touches, and wake as one does", "[modes_passive]") {
+TEST_CASE("Modes sleep while no passive link touches, and wake when one does", "[modes_passive]") {
   const std::string text = scenes::square_mesh("m", 8, 9, "0.1", "0.02") +
                            "@in1 posInput 1.\n@t1 contact @m_m2_3 @in1 0.5 0.01 0.\n"
                            "@in2 frcInput @m_m6_2\n" +
@@ -218,7 +218,7 @@ TEST_CASE("Modes sleep while no passive link touches, and wake as one does", "[m
   CHECK(worst < 1e-3 * peak);
 }
 
-TEST_CASE("Passive links on modes never ask for memory", "[modes_passive]") {
+TEST_CASE("Passive links on modes allocate no memory", "[modes_passive]") {
   Program program = in_modes(busy_string(), Passivity::always);
   support::Bare<double> bare(program);
   std::vector<double> value(64 * program.inputs.size());
@@ -244,7 +244,7 @@ TEST_CASE("Passive links on modes never ask for memory", "[modes_passive]") {
   CHECK(calls == 0);
 }
 
-TEST_CASE("What is too much to be solved together is left to the masses", "[modes_passive]") {
+TEST_CASE("Networks with too many passive links have no modal form", "[modes_passive]") {
   const auto held = [](int count) {
     std::string text = scenes::string("s", 40, "0.1", "0.01") + "@floor ground -0.1\n";
     for (int i = 0; i < count; ++i) {
@@ -256,7 +256,7 @@ TEST_CASE("What is too much to be solved together is left to the masses", "[mode
   CHECK_FALSE(modal_form(held(33)).has_value());
 }
 
-TEST_CASE("Modes that are left out give way to passive links as well", "[modes_passive]") {
+TEST_CASE("The compliance of omitted modes acts on passive links, too", "[modes_passive]") {
   // A finger lies hard on a row of masses that only air damping holds, so each mode contributes to
   // its rest position. The reaction force is measured by the displacement of the mass, relative to
   // the displacement by a small force.

@@ -10,7 +10,7 @@ using support::in_modes;
 using support::isas;
 using support::show;
 
-TEST_CASE("A string driven and heard at places has its modes", "[modes_places]") {
+TEST_CASE("A string with inputs and outputs at places has a modal form", "[modes_places]") {
   const Program program = in_modes(
       "@K param 0.3\n@Z param 0.002\n@s string 20 1. K Z 0. 0.\n@in1 frcInput [@s 0.3]\n"
       "@out1 posOutput [@s 0.7]\n@out2 posOutput [@s 0.01]\n");
@@ -37,7 +37,7 @@ TEST_CASE("A place's modes are sums of those of the masses around it", "[modes_p
   }
 }
 
-TEST_CASE("A mesh is held and struck at places", "[modes_places]") {
+TEST_CASE("A mesh with modes is held and struck at places", "[modes_places]") {
   // Springs at places are springs between sums of masses. K and Z have the same ratio everywhere.
   const std::string mesh =
       "@k param 0.1\n@z param 0.004\n@s cornerMesh 6 9 1. k z 0. 0.\n@g ground 0.02\n"
@@ -62,7 +62,7 @@ TEST_CASE("A mesh is held and struck at places", "[modes_places]") {
   }
 }
 
-TEST_CASE("Forces at masses, places, grounds and hands are felt through the modes",
+TEST_CASE("Force outputs at masses, places, grounds and position inputs work with modes",
           "[modes_places]") {
   const std::string held =
       "@k param 0.1\n@z param 0.004\n@s cornerMesh 6 9 1. k z 0. 0.\n@g ground 0.02\n"
@@ -93,7 +93,7 @@ TEST_CASE("Forces at masses, places, grounds and hands are felt through the mode
   }
 }
 
-TEST_CASE("A force that rests is felt as it is pushed back", "[modes_places]") {
+TEST_CASE("A constant force equals its reaction force", "[modes_places]") {
   // A mass on one spring, with exact modes: the spring's force on the mass is its reaction force on
   // the ground.
   const std::string text =
@@ -110,7 +110,7 @@ TEST_CASE("A force that rests is felt as it is pushed back", "[modes_places]") {
   CHECK(std::fabs(heard[1]) < 1e-12);
 }
 
-TEST_CASE("A place that a parameter moves is left to the direct kernel", "[modes_places]") {
+TEST_CASE("A place that a parameter moves has no modal form", "[modes_places]") {
   const std::string string = "@u param 0.3\n@s string 20 1. 0.3 0.002 0. 0.\n";
   const auto has_modes = [&](const std::string& text) {
     return modal_form(support::program_of(string + text)).has_value();

@@ -22,7 +22,7 @@ std::string touched() {
          scenes::output(1, "s_m3") + scenes::output(2, "o") + "@out3 frcOutput @s_m6\n";
 }
 
-TEST_CASE("several steps a sample are as many samples at a finer rate", "[oversampled]") {
+TEST_CASE("several steps a sample equal as many samples at a higher rate", "[oversampled]") {
   const Program coarse = make_program(network_of(touched()), 44100.0, true);
   for (const Isa isa : isas()) {
     Program program = coarse;
@@ -57,7 +57,7 @@ TEST_CASE("several steps a sample are as many samples at a finer rate", "[oversa
   }
 }
 
-TEST_CASE("coefficients on their way and states go through to the finer steps", "[oversampled]") {
+TEST_CASE("ramps and states are passed on to the finer steps", "[oversampled]") {
   Program program = make_program(network_of(touched()), 44100.0, true);
   program.form = oversampled_form(oversampled_program(program, times), times);
   Bare<double> one(program);
