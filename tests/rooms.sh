@@ -242,7 +242,8 @@ for missing in 'core/rooms.h:.*:model finds laws' 'app/rooms.h:.*:session finds 
   fi
 done
 
-# What stands beside the rooms, in a checkout; elsewhere nobody knows what else is there.
+# Checks the folders beside the rooms. Works in a checkout only, because other copies may contain
+# other files.
 if git rev-parse --is-inside-work-tree >/dev/null 2>&1; then
   strangers=$(git ls-files | sed 's|/.*||' | sort -u |
     grep -vx -e '\..*' -e CMakeLists.txt -e app -e core -e models -e presets -e tests -e README.md ||

@@ -22,7 +22,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from browser import Browser  # noqa: E402
 
 SERVER = "ressort-panel"
-PATIENCE_S = 30  # what only a hang takes
+PATIENCE_S = 30  # longer than anything but a hang takes
 failures = 0
 
 
@@ -180,7 +180,7 @@ def plucks(program, browser):
     check(browser.eventually("struck === 1"), "and seen")
 
 
-# Two pendulums that nothing joins, each of two masses; inputs are at the first ones.
+# Two unconnected pendulums of two masses each; the inputs are at the first masses.
 APART = """@g ground 0.
 @low_a osc 1. 0.0009 0.0001 0. 0.
 @low_b mass 1. 0. 0.
@@ -195,7 +195,7 @@ APART = """@g ground 0.
 """
 
 
-# Two strings that nothing joins, and no input anywhere.
+# Two unconnected strings without an input.
 STRUNG = """@low waveguide 1. 148.9 3. 0.2 0.
 @high waveguide 1. 446.7 3. 0.2 0.
 @out1 posOutput [@low 0.3]
@@ -343,7 +343,7 @@ def slides(program, browser):
     check(eventually(lambda: program.parameter("mesh_Z") > start * 1.01),
           "a slider of the page turns the parameter")
 
-    # The page sends what was turned when it gets to it: all of it is to be there before another turns.
+    # The page sends changes with a delay, so wait until all have arrived before the next change.
     def has_settled():
         before = program.parameter("mesh_Z")
         time.sleep(0.5)
@@ -389,7 +389,8 @@ def slows_down(program, browser):
     most = max(abs(x) for x in jumps)
     steps = sorted(abs(a - b) / most for a, b in zip(jumps, jumps[1:]))
     print(f"        of what it swings, {100 * steps[len(steps) // 2]:.0f} % from frame to frame")
-    # How slow depends on how many frames a busy machine draws: tests/unit/panel/panel_test has that.
+    # The slow motion depends on the number of frames that a busy machine draws, so
+    # tests/unit/panel/panel_test measures it.
     check(most > 0 and browser.evaluate(
         "document.getElementById('slow').getAttribute('aria-pressed') === 'true'"),
         "slow motion goes on and moves")

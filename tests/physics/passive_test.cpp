@@ -89,7 +89,7 @@ TEST_CASE("S08, T10: a ball leaves a lossless wall at the speed it came with", "
   struct Row {
     double k;
     double lowest;
-    double highest;  // Of the published scheme.
+    double highest;  // in the published scheme
   };
   for (const auto& [k, lowest, highest] : {Row{.01, .9988, 1.0012},
                                            {.1, .995, 1.005},

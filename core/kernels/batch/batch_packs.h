@@ -40,7 +40,7 @@ constexpr std::size_t lanes_of = sizeof(V) / sizeof(Scalar<V>);
 // A range of packs that take each operation in turn.
 template <class V>
 struct Packs {
-  // Of all packs in each row, selects those with playing lanes.
+  // Selects, of all packs in each row, those with playing lanes.
   Packs(const BatchTable& table, void* memory, std::size_t lanes)
       : all(table.packs),
         count(std::min(all, lanes / lanes_of<V> + (lanes % lanes_of<V> != 0 ? 1 : 0))),

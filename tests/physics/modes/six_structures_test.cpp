@@ -213,7 +213,7 @@ TEST_CASE("mixes 1 to 6 equal the stored ones, linear in dB in between", "[six_s
   }
 }
 
-// With all six together the sound is audible everywhere. Linear interpolation of dB between the
+// The sound of all six together is audible everywhere. Linear interpolation of dB between the
 // extremes would fade in between.
 TEST_CASE("a key is audible at every mix", "[six_structures]") {
   const int timbre = index_of("timbre");

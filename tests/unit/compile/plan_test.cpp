@@ -136,7 +136,7 @@ TEST_CASE("a plan repeats the forms of an earlier one", "[plan]") {
 }
 
 TEST_CASE("several steps a sample are measured in every form that steps them", "[plan]") {
-  // With a cubic spring, only more steps per sample keep a budget of cents.
+  // Only more steps per sample keep a budget of cents with a cubic spring.
   const std::string bent = scenes::string("s", 12, "0.1", "0.001") +
                            "@b nlSpring3 @s_m2 @s_m7 0.05 0.5 0.\n@in1 frcInput @s_m3\n" +
                            scenes::output(1, "s_m4");

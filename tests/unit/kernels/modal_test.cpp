@@ -137,7 +137,7 @@ TEST_CASE("Masses, grounds, gravity and offsets keep their positions with modes"
       "@K param 0.1\n@M param 1.5\n@A param 0.02\n@B param 0.003\n@g ground 1.\n"
       "@a osc M A B 0.1 0.\n@b osc M A B 0. 0.\n@in1 frcInput @b\n"
       "@s spring @a @b K\n@r spring @a @g A\n@u spring @b @g A\n@out1 posOutput @a\n",
-      // With gravity.
+      // A network with gravity.
       "@K param 0.1\n@Z param 0.01\n@G param 0.001\n@g ground 0.\n@in1 posInput 0.\n"
       "@a mass 1. G 0. 0.\n@b mass 1. G 0. 0.\n@s springDamper @a @b K Z\n"
       "@t springDamper @g @a K Z\n@u springDamper @b @in1 K Z\n@out1 posOutput @b\n"};
