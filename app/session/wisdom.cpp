@@ -56,11 +56,9 @@ std::string wisdom_path() {
 }
 
 std::optional<double> Wisdom::recall(const std::string& key) {
-  if (!known_) {
-    known_ = path_.empty() ? std::map<std::string, double>() : read_entries(path_);
-  }
-  const auto found = known_->find(digest_of(key));
-  return found == known_->end() ? std::nullopt : std::optional(found->second);
+  const auto& entries = known();
+  const auto found = entries.find(digest_of(key));
+  return found == entries.end() ? std::nullopt : std::optional(found->second);
 }
 
 void Wisdom::keep(const std::string& key, double ns) {
@@ -69,9 +67,14 @@ void Wisdom::keep(const std::string& key, double ns) {
   }
   const std::string short_key = digest_of(key);
   added_[short_key] = ns;
-  if (known_) {
-    (*known_)[short_key] = ns;
+  known()[short_key] = ns;
+}
+
+std::map<std::string, double>& Wisdom::known() {
+  if (!known_) {
+    known_ = path_.empty() ? std::map<std::string, double>() : read_entries(path_);
   }
+  return *known_;
 }
 
 void Wisdom::save() {

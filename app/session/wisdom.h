@@ -27,6 +27,8 @@ class Wisdom {
   void save();
 
  private:
+  std::map<std::string, double>& known();  // reads the file at the first call
+
   std::string path_;
   std::optional<std::map<std::string, double>> known_;  // nothing before the file is read
   std::map<std::string, double> added_;                 // since the last save()
