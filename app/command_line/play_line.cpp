@@ -41,7 +41,7 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
           [](std::string& word) {
             const bool is_known =
                 word == "auto" || word == "jack" || word == "alsa" || word == "none";
-            return is_known || names_midi_file(word)
+            return is_known || is_midi_file_name(word)
                        ? std::string()
                        : "must be auto, jack, alsa, none or a .mid file, found " + word;
           },

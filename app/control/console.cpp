@@ -210,9 +210,9 @@ Result<Command> parse_command(std::string_view line) {
   return Command{std::string(row.command), std::move(words)};
 }
 
-Console::Console(Process& process, Session& session, Print print, Print tell)
+Console::Console(Process& process, Session& session, Print print, Print report)
     : context_(new ConsoleContext{process, session, std::move(print),
-                                  Recorder(process, std::move(tell))}) {}
+                                  Recorder(process, std::move(report))}) {}
 
 Console::~Console() = default;
 
@@ -258,7 +258,7 @@ bool Console::has_quit() const {
   return context_->has_quit;
 }
 
-void Console::lend_keyboard(Keyboard keyboard) {
+void Console::set_keyboard(Keyboard keyboard) {
   context_->keyboard = std::move(keyboard);
 }
 

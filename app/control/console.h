@@ -38,7 +38,7 @@ using Keyboard = std::function<void(const std::function<bool(char key)>& on_key)
 class Console {
  public:
   using Print = std::function<void(const std::string&)>;
-  Console(Process& process, Session& session, Print print, Print tell);
+  Console(Process& process, Session& session, Print print, Print report);
   ~Console();
 
   // Return false if the command was `quit`. [console thread]
@@ -53,7 +53,7 @@ class Console {
   bool has_quit() const;
 
   // Sets the keyboard that the command `keys` plays from; without one it fails.
-  void lend_keyboard(Keyboard keyboard);
+  void set_keyboard(Keyboard keyboard);
 
   // Returns the words that could complete the last word of `line`: commands, parameters, presets,
   // models, files. A folder ends in '/'. [console thread]

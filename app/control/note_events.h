@@ -6,12 +6,12 @@
 
 namespace ressort::control::events {
 
-Events note_on(const Said& said);        // KEY VELOCITY ID; ID 0: none.
-Events note_off(const Said& said);       // KEY VELOCITY ID.
-Events note_hz(const Said& said);        // ID HZ VELOCITY
-Events note_end(const Said& said);       // ID
-Events note_bend(const Said& said);      // ID SEMITONES
-Events note_pressure(const Said& said);  // ID VALUE
-Events note_slide(const Said& said);     // ID VALUE
+Events note_on(const PlayCall& call);        // KEY VELOCITY ID; ID 0: none.
+Events note_off(const PlayCall& call);       // KEY VELOCITY ID.
+Events note_hz(const PlayCall& call);        // ID HZ VELOCITY
+Events note_end(const PlayCall& call);       // ID
+Events note_bend(const PlayCall& call);      // ID SEMITONES
+Events note_pressure(const PlayCall& call);  // ID VALUE
+Events note_slide(const PlayCall& call);     // ID VALUE
 
 }  // namespace ressort::control::events

@@ -72,14 +72,14 @@ Error unknown(const Message& message, const Instrument& instrument) {
 }
 
 // One address may drive several inputs and parameters.
-Events custom_events(const Said& said) {
+Events custom_events(const PlayCall& call) {
   std::vector<Event> events;
-  for (const CustomInfo& info : said.instrument.custom) {
-    if (info.address == said.message.address) {
+  for (const CustomInfo& info : call.instrument.custom) {
+    if (info.address == call.message.address) {
       events.push_back({.kind = EventKind::custom,
                         .index = static_cast<std::uint16_t>(info.row),
-                        .model = said.serial,
-                        .value = said.arguments[0]});
+                        .model = call.serial,
+                        .value = call.arguments[0]});
     }
   }
   return events;
@@ -120,16 +120,16 @@ std::optional<std::string> read_arguments(const Row& row, const Message& message
     }
     values[count++] = *value;
   }
-  const std::size_t said = message.arguments.size();
-  return count >= said || row.ignores_more
+  const std::size_t found = message.arguments.size();
+  return count >= found || row.ignores_more
              ? std::nullopt
-             : std::optional("too many arguments: " + std::to_string(said) + ", expected " +
+             : std::optional("too many arguments: " + std::to_string(found) + ", expected " +
                              std::to_string(count));
 }
 
 }  // namespace
 
-std::uint16_t Said::whole(std::size_t argument) const {
+std::uint16_t PlayCall::whole(std::size_t argument) const {
   return static_cast<std::uint16_t>(std::lround(arguments[argument]));
 }
 
@@ -224,11 +224,11 @@ Events to_events(const Message& message, const Instrument& instrument, std::uint
   if (row == nullptr || row->play == nullptr) {
     return unknown(message, instrument);
   }
-  Said said{.message = message,
-            .instrument = instrument,
-            .serial = serial,
-            .name = name,
-            .gesture = row->gesture};
+  PlayCall call{.message = message,
+                .instrument = instrument,
+                .serial = serial,
+                .name = name,
+                .gesture = row->gesture};
   if (pattern_of(*row).hole == "N") {
     if (!std::all_of(name.begin(), name.end(), [](char c) { return c >= '0' && c <= '9'; })) {
       return unknown(message, instrument);
@@ -237,10 +237,10 @@ Events to_events(const Message& message, const Instrument& instrument, std::uint
     if (!input) {
       return input.error();
     }
-    said.input = *input;
+    call.input = *input;
   }
-  const auto wrong = read_arguments(*row, message, said.arguments);
-  return wrong ? Events(Error{message.address + ": " + *wrong}) : row->play(said);
+  const auto wrong = read_arguments(*row, message, call.arguments);
+  return wrong ? Events(Error{message.address + ": " + *wrong}) : row->play(call);
 }
 
 std::string describe_limit(const Message& message, const Event& event,

@@ -30,7 +30,7 @@ inline constexpr std::size_t most_arguments = 3;
 using Words = std::span<const std::string>;
 
 // A playing message whose arguments are complete and within their ranges.
-struct Said {
+struct PlayCall {
   const Message& message;
   const Instrument& instrument;
   std::uint32_t serial = 0;             // Serial number of the model that the events are for.
@@ -44,7 +44,7 @@ struct Said {
 using Events = Result<std::vector<Event>>;
 
 // An OSC query.
-struct Question {
+struct Query {
   const Message& message;
   std::string_view name;  // The text in place of NAME in the address.
   Session& session;
@@ -61,11 +61,11 @@ struct Row {
   CallArgument arguments[most_arguments] = {};  // Entries without a word are unused.
   std::string_view does = {};                   // Help text, one line.
   // Returns the events, all at frame 0. Null: plays nothing and is not valid in a score.
-  Events (*play)(const Said& said) = nullptr;
+  Events (*play)(const PlayCall& call) = nullptr;
   Gesture gesture = Gesture::position;  // Gesture of an address of an input.
   bool ignores_more = false;            // Ignores further arguments, such as a button's value.
   // Replies by OSC. If the row also plays, a message without arguments is a query. [OSC's thread]
-  void (*answer)(const Question& question) = nullptr;
+  void (*answer)(const Query& query) = nullptr;
 
   std::string_view command = {};  // Console command; empty: none.
   CommandGroup group = CommandGroup::other;

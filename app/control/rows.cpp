@@ -19,38 +19,38 @@ namespace {
 // --- playing -------------------------------------------------------------------------------------
 
 // Puts the event on the instrument's channel.
-Events one(const Said& said, Event event) {
-  event.channel = said.instrument.channel;
+Events one(const PlayCall& call, Event event) {
+  event.channel = call.instrument.channel;
   return std::vector{event};
 }
 
 // Sets the parameters that a pattern matches.
-Events set_parameters(const Said& said) {
+Events set_parameters(const PlayCall& call) {
   std::vector<Event> events;
   std::vector<std::string> names;
-  for (std::size_t i = 0; i < said.instrument.parameters.size(); ++i) {
-    const ParameterInfo& info = said.instrument.parameters[i];
+  for (std::size_t i = 0; i < call.instrument.parameters.size(); ++i) {
+    const ParameterInfo& info = call.instrument.parameters[i];
     names.push_back(info.name);
-    if (info.audio_input > 0 && said.name == info.name) {
-      return Error{said.message.address + ": input " + std::to_string(info.audio_input) +
+    if (info.audio_input > 0 && call.name == info.name) {
+      return Error{call.message.address + ": input " + std::to_string(info.audio_input) +
                    " sets it in every sample, so no message can"};
     }
-    if (info.audio_input == 0 && fits(said.name, info.name)) {
+    if (info.audio_input == 0 && fits(call.name, info.name)) {
       events.push_back({.kind = EventKind::parameter,
                         .index = static_cast<std::uint16_t>(i),
-                        .model = said.serial,
-                        .value = std::clamp(said.arguments[0], info.minimum, info.maximum)});
+                        .model = call.serial,
+                        .value = std::clamp(call.arguments[0], info.minimum, info.maximum)});
     }
   }
   if (events.empty()) {
-    return Error{said.message.address + ": the model has no such parameter; it has " +
-                 (names.empty() ? "none" : joined(names, ", ")) + did_you_mean(said.name, names)};
+    return Error{call.message.address + ": the model has no such parameter; it has " +
+                 (names.empty() ? "none" : joined(names, ", ")) + did_you_mean(call.name, names)};
   }
   return events;
 }
 
-Events play_input(const Said& said, const GestureRow& gesture) {
-  const InputInfo& input = *said.input;
+Events play_input(const PlayCall& call, const GestureRow& gesture) {
+  const InputInfo& input = *call.input;
   std::string misfit;
   if (gesture.live == Live::by_preset && !input.knows(gesture.gesture)) {
     misfit = "has no " + std::string(gesture.name) + " in this preset";
@@ -60,14 +60,14 @@ Events play_input(const Said& said, const GestureRow& gesture) {
                             : "accepts a position, not a force: use /in/N/position";
   }
   if (!misfit.empty()) {
-    return Error{said.message.address + ": input " + std::to_string(input.number) + " " + misfit};
+    return Error{call.message.address + ": input " + std::to_string(input.number) + " " + misfit};
   }
-  return one(said, {.kind = EventKind::gesture,
+  return one(call, {.kind = EventKind::gesture,
                     .gesture = gesture.gesture,
                     .index = static_cast<std::uint16_t>(input.number),
-                    .model = said.serial,
-                    .value = said.arguments[0],
-                    .value2 = said.arguments[1]});
+                    .model = call.serial,
+                    .value = call.arguments[0],
+                    .value2 = call.arguments[1]});
 }
 
 // Finds the mass NAME, the third mass of a macro as "NAME:3", or the place "NAME:0.3". Otherwise
@@ -105,14 +105,14 @@ Result<std::uint32_t> find_mass(std::span<const StruckInfo> known, std::string_v
                (known.size() > most_named ? " and others" : "")};
 }
 
-Events strike(const Said& said) {
-  const auto mass = find_mass(said.instrument.struck, said.name);
+Events strike(const PlayCall& call) {
+  const auto mass = find_mass(call.instrument.struck, call.name);
   if (!mass) {
-    return Error{said.message.address + ": " + mass.error().message};
+    return Error{call.message.address + ": " + mass.error().message};
   }
-  return one(said, {.kind = EventKind::strike,
-                    .model = said.serial,
-                    .value = said.arguments[0] * said.instrument.blow,
+  return one(call, {.kind = EventKind::strike,
+                    .model = call.serial,
+                    .value = call.arguments[0] * call.instrument.blow,
                     .value2 = static_cast<double>(*mass)});
 }
 
@@ -187,24 +187,24 @@ std::vector<Row> make_rows() {
        .arguments = {number, {"VALUE", "the value", 0, 127}},
        .does = "sends a MIDI controller; value 0-127",
        .play =
-           [](const Said& said) {
-             return one(said, {.kind = EventKind::controller,
-                               .index = said.whole(0),
-                               .value = said.arguments[1] / 127.0});
+           [](const PlayCall& call) {
+             return one(call, {.kind = EventKind::controller,
+                               .index = call.whole(0),
+                               .value = call.arguments[1] / 127.0});
            }},
       {.address = "/pressure",
        .arguments = {{"VALUE", "the pressure", 0, 127}},
        .does = "sets the channel pressure, 0-127",
        .play =
-           [](const Said& said) {
-             return one(said, {.kind = EventKind::pressure, .value = said.arguments[0] / 127.0});
+           [](const PlayCall& call) {
+             return one(call, {.kind = EventKind::pressure, .value = call.arguments[0] / 127.0});
            }},
       {.address = "/bend",
        .arguments = {{"VALUE", "the bend", -1, 1}},
        .does = "bends the pitch, -1 to 1 (two semitones)",
        .play =
-           [](const Said& said) {
-             return one(said, {.kind = EventKind::bend, .value = said.arguments[0]});
+           [](const PlayCall& call) {
+             return one(call, {.kind = EventKind::bend, .value = call.arguments[0]});
            }},
       {.command = "params",
        .group = CommandGroup::parameters,
@@ -258,7 +258,7 @@ std::vector<Row> make_rows() {
     }
     Row row{.address = "/in/N/" + std::string(gesture.name),
             .does = gesture.live_does,
-            .play = [](const Said& said) { return play_input(said, row_of(said.gesture)); },
+            .play = [](const PlayCall& call) { return play_input(call, row_of(call.gesture)); },
             .gesture = gesture.gesture,
             .command = gesture.command.empty() ? "" : gesture.name,
             .group = CommandGroup::playing,
@@ -285,7 +285,7 @@ std::vector<Row> make_rows() {
        .act = command::hit},
       {.address = "/panic",
        .does = "silences everything immediately; ignores a button's value",
-       .play = [](const Said& said) { return one(said, {.kind = EventKind::panic}); },
+       .play = [](const PlayCall& call) { return one(call, {.kind = EventKind::panic}); },
        .ignores_more = true,
        .command = "panic",
        .group = CommandGroup::playing,

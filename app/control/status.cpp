@@ -23,7 +23,7 @@ std::string percent(double share, int digits) {
 }
 
 // The energy in modes is unknown, as is the loss while an input is driven.
-std::string tell_energy(const Status& now) {
+std::string energy_text(const Status& now) {
   if (now.voices == 0) {
     return "none";
   }
@@ -59,7 +59,7 @@ std::string level_meter(double peak_db) {
 }
 
 // Returns for example "A3 (100)"; middle C is C4.
-std::string tell_notes(const Status& now) {
+std::string notes_text(const Status& now) {
   constexpr const char* names[] = {"C", "C#", "D", "D#", "E", "F", "F#", "G", "G#", "A", "A#", "B"};
   std::string text;
   const std::uint64_t places = now.last_notes.size();
@@ -108,12 +108,12 @@ constexpr StatusRow status_table[] = {
     {"shed", "", "voices faded out for lack of CPU time", &Status::shed, not_in_reply, "voices",
      [](const Status& now) { return std::to_string(now.shed) + " dropped for lack of time"; }},
     {"notes", "", "notes started, and the latest with their velocities", &Status::notes,
-     not_in_reply, "notes", tell_notes},
+     not_in_reply, "notes", notes_text},
     {"asleep", "1", "share of the computation saved by sleeping voices", &Status::saved,
      not_in_reply, "asleep",
      [](const Status& now) { return percent(now.saved, 0) + " of the cost of all voices"; }},
     {"energy", "mass * (position / sample)^2", "energy of the sounding voices", &Status::energy,
-     not_in_reply, "energy", tell_energy},
+     not_in_reply, "energy", energy_text},
     {"loss", "energy / s", "energy lost per second", &Status::loss},
     {"driven", "", "an input is driven, so the loss is only partly known", &Status::is_driven},
     {"whole", "", "all of the energy is known", &Status::is_whole},
@@ -179,9 +179,9 @@ Figure figure_of(const StatusRow& row, const Status& status) {
       row.figure);
 }
 
-std::string tell(const StatusRow& row, const Status& status) {
-  if (row.tell != nullptr) {
-    return row.tell(status);
+std::string text_of(const StatusRow& row, const Status& status) {
+  if (row.text != nullptr) {
+    return row.text(status);
   }
   const Figure figure = figure_of(row, status);
   const std::string* const text = std::get_if<std::string>(&figure);
@@ -216,14 +216,14 @@ Reply status_reply(const Status& status) {
 std::vector<std::vector<std::string>> status_lines(const Status& status) {
   std::vector<std::vector<std::string>> lines;
   for (const StatusRow& row : status_table) {
-    const std::string said = row.line.empty() ? "" : tell(row, status);
-    if (said.empty()) {
+    const std::string text = row.line.empty() ? "" : text_of(row, status);
+    if (text.empty()) {
       continue;
     }
     if (lines.empty() || lines.back()[0] != row.line) {
-      lines.push_back({std::string(row.line), said});
+      lines.push_back({std::string(row.line), text});
     } else {
-      lines.back()[1] += ", " + said;
+      lines.back()[1] += ", " + text;
     }
   }
   return lines;

@@ -25,7 +25,7 @@ struct StatusRow {
   int place = not_in_reply;  // Position in /status.reply, from 0.
   std::string_view line;     // Line of the console's `status`; empty: shown with another figure.
   // Returns the text of the line, empty at times; null: name, figure and unit.
-  std::string (*tell)(const Status& status) = nullptr;
+  std::string (*text)(const Status& status) = nullptr;
 };
 std::span<const StatusRow> status_rows();
 

@@ -161,7 +161,7 @@ struct Terminal::Input {
       release_terminal();
     }
     thread.join();
-    console.lend_keyboard({});
+    console.set_keyboard({});
     close(wake[0]);
     close(wake[1]);
   }
@@ -247,7 +247,7 @@ struct Terminal::Input {
       read_lines();
       return;
     }
-    console.lend_keyboard([this](const auto& on_key) { read_keys(on_key); });
+    console.set_keyboard([this](const auto& on_key) { read_keys(on_key); });
     edit_lines();
     el_end(editor);
   }

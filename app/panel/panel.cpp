@@ -261,8 +261,9 @@ struct WebPanel::Server {
       return false;
     }
     if (request.has_param("HOST_INFO")) {
-      response.set_content(osc_host_info(osc.is_heard() ? std::optional(osc.port()) : std::nullopt),
-                           "application/json");
+      response.set_content(
+          osc_host_info(osc.listens_on_udp() ? std::optional(osc.port()) : std::nullopt),
+          "application/json");
       return true;
     }
     std::string attribute;
@@ -493,7 +494,7 @@ bool WebPanel::is_for_all() const {
   return server_->access->needs_token();
 }
 
-void WebPanel::tell(const std::string& news) {
+void WebPanel::show_message(const std::string& news) {
   server_->news->add(news);
 }
 

@@ -45,7 +45,7 @@ class WebPanel {
   bool is_for_all() const;      // True if other machines can reach it.
 
   // Shows a message in the page's list of errors. [any thread but audio]
-  void tell(const std::string& news);
+  void show_message(const std::string& news);
 
  private:
   struct Server;

@@ -31,15 +31,15 @@ const char* kind_of(const LawFacts& law) {
                               : "pluck";
 }
 
-class NetworkTeller {
+class NetworkJsonWriter {
  public:
-  explicit NetworkTeller(const Picture& picture)
+  explicit NetworkJsonWriter(const Picture& picture)
       : picture_(picture),
         network_(expand_macros(*picture.network)),
         parameters_(parameter_values(network_)),
         node_(network_.masses.size(), nowhere) {}
 
-  std::string tell() {
+  std::string write() {
     lay_out();
     add_nodes();
     place_hands();
@@ -343,7 +343,7 @@ class NetworkTeller {
 }  // namespace
 
 std::string network_json(const Picture& picture) {
-  return NetworkTeller(picture).tell();
+  return NetworkJsonWriter(picture).write();
 }
 
 Result<std::string> modes_json(const Picture& picture, std::span<const double> parameters,

@@ -66,7 +66,7 @@ std::optional<int> DspLoad::give_way(int sounding, int all) {
       return {};
     }
     // The load has another cause than the voices.
-    begin_anew();
+    restart();
     waits_s_ = patience_s;
     return all;
   }
@@ -79,7 +79,7 @@ std::optional<int> DspLoad::give_way(int sounding, int all) {
   return limit_;
 }
 
-void DspLoad::begin_anew() {
+void DspLoad::restart() {
   limit_ = 0;
   first_ = before_ = waits_s_ = 0.0;
   forget();

@@ -35,7 +35,7 @@ class DspLoad {
   int limit() const { return limit_; }  // voices; 0: no limit
 
   // Removes the limit and forgets the measurements, because another model plays from now on.
-  void begin_anew();
+  void restart();
   // Forgets the measurements, because voices have just been stolen.
   void forget();
 

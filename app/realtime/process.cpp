@@ -379,7 +379,7 @@ void Process::swap_models() {
   if (!is_first && !is_same) {
     next->engine->adopt_channels(*fading_->engine);
     ended_ = meters_;
-    load_.begin_anew();
+    load_.restart();
   }
   is_alone_ = next->lets_ring;
   rings_ = is_alone_ && !is_first && !is_same;

@@ -23,7 +23,7 @@ struct Stage {
     session.on_engine(
         [this](Engine& engine, const Network& network) { return feed.watch(engine, network); });
     fuzz::require(static_cast<bool>(session.load_and_wait("IPlayTheTriangle")));
-    auto opened = OscServer::open_unheard(harness.process, session, [](const std::string&) {});
+    auto opened = OscServer::open_without_udp(harness.process, session, [](const std::string&) {});
     fuzz::require(static_cast<bool>(opened));
     osc = *std::move(opened);
     auto made = WebPanel::open({.port = 0}, harness.process, session, feed, *osc);

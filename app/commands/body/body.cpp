@@ -25,7 +25,7 @@ int body_command(const BodyRequest& request) {
     options.modes = static_cast<std::size_t>(request.modes.value_or(0));
     return network_body(options);
   }
-  if (names_solid(request.input)) {
+  if (is_solid_file_name(request.input)) {
     SolidBodyOptions options = common(request.solid);
     options.picture = request.picture;
     options.modes = request.modes.value_or(options.modes);

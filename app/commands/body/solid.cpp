@@ -243,7 +243,7 @@ std::string header_comment(const SolidBodyOptions& options, const MaterialChoice
 
 }  // namespace
 
-bool names_solid(const std::string& file) {
+bool is_solid_file_name(const std::string& file) {
   const std::string name = lower(file);
   return name.ends_with(".stl") || name.ends_with(".obj");
 }

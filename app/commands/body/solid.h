@@ -38,7 +38,7 @@ struct SolidBodyOptions {
 };
 
 // Returns whether a file name ends in .stl or .obj.
-bool names_solid(const std::string& file);
+bool is_solid_file_name(const std::string& file);
 
 // Reads and meshes the solid, computes its modes and writes them as a model. Prints progress to
 // stderr and a summary to stdout. Returns the exit code. [main]

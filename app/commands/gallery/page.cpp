@@ -222,7 +222,7 @@ plot::Figure gallery_figure(const std::vector<ShownPreset>& presets) {
     if (preset.failure.empty()) {
       const Spectrogram& all = preset.spectrogram;
       figure.panels.push_back(spectrogram_panel(
-          preset, made_smaller(all, (all.rows + 1) / 2, all.columns / 2), {100.0, 1e3, 1e4}));
+          preset, downsampled(all, (all.rows + 1) / 2, all.columns / 2), {100.0, 1e3, 1e4}));
       figure.panels.back().title = preset.name;
     }
   }

@@ -85,7 +85,7 @@ Spectrogram find_spectrogram(const Sound& sound, Stretch stretch, std::size_t ro
   return made;
 }
 
-Spectrogram made_smaller(const Spectrogram& from, std::size_t rows, std::size_t columns) {
+Spectrogram downsampled(const Spectrogram& from, std::size_t rows, std::size_t columns) {
   Spectrogram made = from;
   made.rows = rows;
   made.columns = columns;

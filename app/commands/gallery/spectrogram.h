@@ -29,6 +29,6 @@ Spectrogram find_spectrogram(const Sound& sound, Stretch stretch, std::size_t ro
                              std::size_t columns);
 
 // Downsamples to fewer cells, each with its highest level.
-Spectrogram made_smaller(const Spectrogram& from, std::size_t rows, std::size_t columns);
+Spectrogram downsampled(const Spectrogram& from, std::size_t rows, std::size_t columns);
 
 }  // namespace ressort::commands

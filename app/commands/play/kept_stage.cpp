@@ -22,8 +22,8 @@ std::optional<std::string> behind(std::string_view line, std::string_view word) 
 
 }  // namespace
 
-Result<Done> keep_stage(const std::string& folder, Session& session,
-                        const std::vector<Cable>& cables) {
+Result<Done> save_state_to(const std::string& folder, Session& session,
+                           const std::vector<Cable>& cables) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) {
@@ -53,7 +53,7 @@ Result<Done> keep_stage(const std::string& folder, Session& session,
   return write_text((fs::path(folder) / list_name).string(), list, Existing::replace);
 }
 
-std::string stage_state(const Session& session) {
+std::string current_state(const Session& session) {
   const Session::Present now = session.present();
   if (now.loaded->serial == 0) {
     return "";
@@ -71,8 +71,8 @@ std::string stage_state(const Session& session) {
   return state;
 }
 
-Result<KeptStage> find_stage(const std::string& folder) {
-  KeptStage stage;
+Result<SavedState> read_saved_state(const std::string& folder) {
+  SavedState stage;
   const fs::path path = fs::path(folder) / list_name;
   std::error_code error;
   if (!fs::exists(path, error)) {

@@ -10,20 +10,20 @@
 
 namespace ressort::commands {
 
-struct KeptStage {
+struct SavedState {
   std::string scene;                // path; empty: nothing was saved
   std::vector<std::string> tuning;  // paths, as for the command `tuning`
   std::vector<Cable> cables;
 };
 
 // Writes the state, and replaces the previous one when the new one is complete. Blocks on the disk.
-Result<Done> keep_stage(const std::string& folder, Session& session,
-                        const std::vector<Cable>& cables);
+Result<Done> save_state_to(const std::string& folder, Session& session,
+                           const std::vector<Cable>& cables);
 
 // Returns the state without the connections as a text to compare; empty if nothing is loaded.
-std::string stage_state(const Session& session);
+std::string current_state(const Session& session);
 
 // Reads the state. Empty if the folder does not exist; fails if it cannot be read.
-Result<KeptStage> find_stage(const std::string& folder);
+Result<SavedState> read_saved_state(const std::string& folder);
 
 }  // namespace ressort::commands

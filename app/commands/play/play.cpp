@@ -54,11 +54,11 @@ class Player {
       complain(allowed.error().message);
       return exit_code::wrong_use;
     }
-    if (names_midi_file(options_.name)) {  // MODEL may be a MIDI file
+    if (is_midi_file_name(options_.name)) {  // MODEL may be a MIDI file
       options_.midi = std::exchange(options_.name, PlayOptions().name);
     }
     std::optional<MidiFile> song;
-    if (names_midi_file(options_.midi)) {
+    if (is_midi_file_name(options_.midi)) {
       auto read = read_midi_file(options_.midi);
       if (!read) {
         complain(read.error().message);
@@ -216,7 +216,7 @@ class Player {
     auto manager = NsmClient::announce(
         url, [this](const NsmProject& project) { return open_project(project); },
         [this] { return save_project(); },
-        [this] { return session_ ? stage_state(*session_) : std::string(); });
+        [this] { return session_ ? current_state(*session_) : std::string(); });
     if (!manager) {
       complain(manager.error().message);
       return exit_code::wrong_use;
@@ -238,7 +238,7 @@ class Player {
 
   // Before the sound starts: selects the scene. Later: replaces the current state.
   Result<Done> open_project(const NsmProject& project) {
-    auto stage = find_stage(project.path);
+    auto stage = read_saved_state(project.path);
     if (!stage) {
       return stage.error();
     }
@@ -278,7 +278,7 @@ class Player {
       return Done{};
     }
     const Wiring wiring = device_.wiring ? device_.wiring() : options_.device.wiring;
-    return keep_stage(project_.path, *session_, wiring.missing());
+    return save_state_to(project_.path, *session_, wiring.missing());
   }
 
   void tune_as_kept() {
@@ -374,9 +374,9 @@ class Player {
       }
     }
     if (osc_ == nullptr) {
-      if (auto unheard = OscServer::open_unheard(process_, *session_, hear);
-          unheard && options_.panel.port != 0) {
-        osc_ = *std::move(unheard);  // used by the panel
+      if (auto osc = OscServer::open_without_udp(process_, *session_, hear);
+          osc && options_.panel.port != 0) {
+        osc_ = *std::move(osc);  // used by the panel
       }
       return;
     }
@@ -408,7 +408,7 @@ class Player {
     voice_.say(news);
     const std::lock_guard lock(panel_mutex_);
     if (panel_) {
-      panel_->tell(news);
+      panel_->show_message(news);
     }
   }
 

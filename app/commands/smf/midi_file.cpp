@@ -297,7 +297,7 @@ Result<MidiFile> read_midi_file(const std::string& path) {
   return midi;
 }
 
-bool names_midi_file(std::string_view path) {
+bool is_midi_file_name(std::string_view path) {
   std::string lower(path);
   std::transform(lower.begin(), lower.end(), lower.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });

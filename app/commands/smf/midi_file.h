@@ -40,6 +40,6 @@ Result<MidiFile> parse_midi_file(std::span<const std::uint8_t> file);
 Result<MidiFile> read_midi_file(const std::string& path);
 
 // Returns whether a name ends in .mid or .midi, in upper or lower case.
-bool names_midi_file(std::string_view path);
+bool is_midi_file_name(std::string_view path);
 
 }  // namespace ressort::commands

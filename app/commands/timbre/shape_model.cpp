@@ -31,20 +31,20 @@ constexpr int usual_key = 57;
 constexpr double near_f0 = 0.03;  // tolerance of the mode at the pitch
 
 // Targets that a sound file sets.
-struct Liked {
+struct SoundTargets {
   std::vector<TimbreTarget> targets;
   std::optional<double> f0_hz;
   double rate_hz = 0.0;
 };
 
 // Returns the figures of the loudest frame. A model is described by the first frame after a strike.
-Result<Liked> liked(const std::string& path, const Progress& progress,
-                    const std::function<bool()>& goes_on) {
+Result<SoundTargets> liked(const std::string& path, const Progress& progress,
+                           const std::function<bool()>& goes_on) {
   const auto sound = describe_sound(path, {}, [&](double) { return goes_on(); });
   if (!sound) {
     return sound.error();
   }
-  Liked like{.f0_hz = sound->f0_hz, .rate_hz = sound->rate_hz};
+  SoundTargets like{.f0_hz = sound->f0_hz, .rate_hz = sound->rate_hz};
   const FigureValues& values = sound->frames[sound->loudest].values;
   for (const AskedFigureRow& row : asked_figure_rows()) {
     const std::size_t number = figure_number(row.name);
@@ -180,7 +180,7 @@ int shape_model(const ShapeOptions& options, const std::function<bool()>& goes_o
     output.emplace(*std::move(file));
   }
   double rate_hz = options.rate_hz.value_or(Network::reference_rate_hz);
-  Liked like;
+  SoundTargets like;
   if (!options.like.empty()) {
     auto found = liked(options.like, progress, goes_on);
     if (!found) {
@@ -230,7 +230,8 @@ int shape_model(const ShapeOptions& options, const std::function<bool()>& goes_o
        .key = options.key.value_or(like.f0_hz ? key_near(*like.f0_hz, scene->preset) : usual_key),
        .rate_hz = rate_hz,
        .progress = Progress([&](std::string_view) { return goes_on(); }),
-       .tell = [&](double share) { bar->show(share, "searching the timbre of " + scene->name); }},
+       .on_progress =
+           [&](double share) { bar->show(share, "searching the timbre of " + scene->name); }},
       targets);
   bar.reset();
   if (!shaped) {

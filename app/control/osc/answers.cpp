@@ -17,62 +17,59 @@ namespace {
 
 // Adds a row, or none, for every parameter whose name matches.
 template <class MakeRow>
-void answer_parameters(const Question& question, MakeRow&& make_row) {
-  const std::string& address = question.message.address;
-  if (!question.client.may_have_rows(address)) {
+void answer_parameters(const Query& query, MakeRow&& make_row) {
+  const std::string& address = query.message.address;
+  if (!query.client.may_have_rows(address)) {
     return;
   }
-  const auto loaded = question.session.current();
+  const auto loaded = query.session.current();
   std::vector<Reply> rows;
   bool has_any = false;
   for (const ParameterInfo& info : loaded->instrument.parameters) {
-    if (fits(question.name, info.name)) {
+    if (fits(query.name, info.name)) {
       has_any = true;
       make_row(info, rows);
     }
   }
-  question.client.answer_rows(rows);
+  query.client.answer_rows(rows);
   if (!has_any) {
-    question.client.error(address,
-                          "the model has no such parameter; /param/* lists its parameters");
+    query.client.error(address, "the model has no such parameter; /param/* lists its parameters");
   }
 }
 
 // Returns the length of a subscription in seconds, from now; sends an error and returns nothing if
 // it is invalid.
-std::optional<double> lease(const Question& question, Subscribers::News news,
-                            std::string_view reply) {
+std::optional<double> lease(const Query& query, Subscribers::News news, std::string_view reply) {
   constexpr double usual_s = 10.0;
-  const auto& arguments = question.message.arguments;
+  const auto& arguments = query.message.arguments;
   const double* const asked = arguments.empty() ? &usual_s : std::get_if<double>(arguments.data());
   if (asked == nullptr || arguments.size() > 1 ||
       !(*asked > 0.0 && *asked <= Subscribers::longest_lease_s)) {
-    question.client.error(question.message.address, "expected SECONDS, above 0 and at most " +
-                                                        print_number(Subscribers::longest_lease_s));
+    query.client.error(query.message.address, "expected SECONDS, above 0 and at most " +
+                                                  print_number(Subscribers::longest_lease_s));
     return std::nullopt;
   }
-  if (auto added = question.subscribers.add(question.client, news, *asked, monotonic_ns());
-      !added) {
-    question.client.error(question.message.address, added.error().message);
+  if (auto added = query.subscribers.add(query.client, news, *asked, monotonic_ns()); !added) {
+    query.client.error(query.message.address, added.error().message);
     return std::nullopt;
   }
-  question.client.answer(Reply(reply).real(*asked));
+  query.client.answer(Reply(reply).real(*asked));
   return *asked;
 }
 
 }  // namespace
 
-void answer::parameters(const Question& question) {
-  answer_parameters(question, [&](const ParameterInfo& info, std::vector<Reply>& rows) {
+void answer::parameters(const Query& query) {
+  answer_parameters(query, [&](const ParameterInfo& info, std::vector<Reply>& rows) {
     // Empty if another model was loaded in between.
-    if (const auto value = question.session.parameter(info.name)) {
+    if (const auto value = query.session.parameter(info.name)) {
       rows.push_back(Reply("/param/" + info.name).real(*value));
     }
   });
 }
 
-void answer::ranges(const Question& question) {
-  answer_parameters(question, [](const ParameterInfo& info, std::vector<Reply>& rows) {
+void answer::ranges(const Query& query) {
+  answer_parameters(query, [](const ParameterInfo& info, std::vector<Reply>& rows) {
     rows.push_back(Reply("/param/" + info.name + "/range")
                        .real(info.minimum)
                        .real(info.maximum)
@@ -81,9 +78,9 @@ void answer::ranges(const Question& question) {
   });
 }
 
-void answer::load(const Question& question) {
-  const Message& message = question.message;
-  const OscClient& client = question.client;
+void answer::load(const Query& query) {
+  const Message& message = query.message;
+  const OscClient& client = query.client;
   if (message.arguments.empty() || message.arguments.size() > 2 ||
       !std::holds_alternative<std::string>(message.arguments[0])) {
     client.error(message.address, message.address + ": expected NAME [ID]");
@@ -105,55 +102,55 @@ void answer::load(const Question& question) {
       const std::string reason = without_source(full);
       reply.text(reason);
       if (reason != full) {
-        client.outlet().tell_failure("OSC could not load it:\n" + full);
+        client.outlet().log_failure("OSC could not load it:\n" + full);
       }
     }
     client.answer(reply);
   };
-  question.session.load(std::get<std::string>(message.arguments[0]), answer, false,
-                        Reach::own_folders);
+  query.session.load(std::get<std::string>(message.arguments[0]), answer, false,
+                     Reach::own_folders);
 }
 
 // Never overwrites: the sender of a packet has not seen what is there.
-void answer::save(const Question& question) {
-  const Message& message = question.message;
+void answer::save(const Query& query) {
+  const Message& message = query.message;
   if (message.arguments.size() != 1 || !std::holds_alternative<std::string>(message.arguments[0])) {
-    question.client.error(message.address, message.address + ": expected NAME");
+    query.client.error(message.address, message.address + ": expected NAME");
     return;
   }
   const auto& name = std::get<std::string>(message.arguments[0]);
-  const auto path = question.session.save(name, Existing::refuse);
+  const auto path = query.session.save(name, Existing::refuse);
   Reply reply(path ? "/done" : "/fail");
   reply.text(message.address).text(path ? name : path.error().message);
-  question.client.answer(reply);
-  question.client.outlet().tell(
-      path ? "OSC saved " + *path : "OSC could not save '" + name + "': " + path.error().message);
+  query.client.answer(reply);
+  query.client.outlet().log(path ? "OSC saved " + *path
+                                 : "OSC could not save '" + name + "': " + path.error().message);
 }
 
-void answer::flight(const Question& question) {
-  const Message& message = question.message;
+void answer::flight(const Query& query) {
+  const Message& message = query.message;
   if (message.arguments.size() != 1 || !std::holds_alternative<std::string>(message.arguments[0])) {
-    question.client.error(message.address, message.address + ": expected NAME");
+    query.client.error(message.address, message.address + ": expected NAME");
     return;
   }
   const auto& name = std::get<std::string>(message.arguments[0]);
-  const auto path = question.session.save_flight(name);
+  const auto path = query.session.save_flight(name);
   Reply reply(path ? "/done" : "/fail");
   reply.text(message.address).text(path ? name : path.error().message);
-  question.client.answer(reply);
-  question.client.outlet().tell(
-      path ? "OSC saved " + *path : "OSC could not save '" + name + "': " + path.error().message);
+  query.client.answer(reply);
+  query.client.outlet().log(path ? "OSC saved " + *path
+                                 : "OSC could not save '" + name + "': " + path.error().message);
 }
 
-void answer::status(const Question& question) {
-  question.client.answer(status_reply(question.session.status(MeterReader::osc)));
+void answer::status(const Query& query) {
+  query.client.answer(status_reply(query.session.status(MeterReader::osc)));
 }
 
-void answer::describe(const Question& question) {
-  if (!question.client.may_have_rows(question.message.address)) {
+void answer::describe(const Query& query) {
+  if (!query.client.may_have_rows(query.message.address)) {
     return;
   }
-  const auto loaded = question.session.current();
+  const auto loaded = query.session.current();
   std::vector<Reply> rows;
   const auto row = [&](std::string_view address, std::string_view arguments,
                        std::string_view meaning) {
@@ -165,7 +162,7 @@ void answer::describe(const Question& question) {
   for (const ParameterInfo& info : loaded->instrument.parameters) {
     row("/param/" + info.name, "f", "parameter of the model");
     rows.back()
-        .real(question.session.parameter(info.name).value_or(info.value))
+        .real(query.session.parameter(info.name).value_or(info.value))
         .real(info.minimum)
         .real(info.maximum)
         .real(info.safe.lowest)
@@ -178,11 +175,11 @@ void answer::describe(const Question& question) {
     }
   }
   rows.push_back(Reply("/describe.end").whole(rows.size()));
-  question.client.answer_rows(rows);
+  query.client.answer_rows(rows);
 }
 
-void answer::models(const Question& question) {
-  if (!question.client.may_have_rows(question.message.address)) {
+void answer::models(const Query& query) {
+  if (!query.client.may_have_rows(query.message.address)) {
     return;
   }
   std::vector<Reply> rows;
@@ -190,11 +187,11 @@ void answer::models(const Question& question) {
     rows.push_back(Reply("/models.reply").text(name));
   }
   rows.push_back(Reply("/models.end").whole(rows.size()));
-  question.client.answer_rows(rows);
+  query.client.answer_rows(rows);
 }
 
-void answer::presets(const Question& question) {
-  if (!question.client.may_have_rows(question.message.address)) {
+void answer::presets(const Query& query) {
+  if (!query.client.may_have_rows(query.message.address)) {
     return;
   }
   std::vector<Reply> rows;
@@ -202,12 +199,12 @@ void answer::presets(const Question& question) {
     rows.push_back(Reply("/presets.reply").text(name).text(preset_description(name)));
   }
   rows.push_back(Reply("/presets.end").whole(rows.size()));
-  question.client.answer_rows(rows);
+  query.client.answer_rows(rows);
 }
 
-void answer::modes(const Question& question) {
-  const Message& message = question.message;
-  const OscClient& client = question.client;
+void answer::modes(const Query& query) {
+  const Message& message = query.message;
+  const OscClient& client = query.client;
   const auto count = mode_count(message.arguments.empty() ? Argument(32.0) : message.arguments[0]);
   if (!count || message.arguments.size() > 1) {
     client.error(message.address, "expected the number of modes, 1 to 10000");
@@ -216,7 +213,7 @@ void answer::modes(const Question& question) {
   if (!client.may_have_rows(message.address)) {
     return;
   }
-  question.session.find_modes(*count, [message, client](const Result<KnownModes>& modes) {
+  query.session.find_modes(*count, [message, client](const Result<KnownModes>& modes) {
     if (!modes) {
       client.error(message.address, without_source(modes.error().message));
       return;
@@ -236,9 +233,9 @@ void answer::modes(const Question& question) {
   });
 }
 
-void answer::tune(const Question& question) {
-  const Message& message = question.message;
-  const OscClient& client = question.client;
+void answer::tune(const Query& query) {
+  const Message& message = query.message;
+  const OscClient& client = query.client;
   const auto target = tune_target(message.arguments);
   if (!target) {
     client.error(message.address, target.error().message);
@@ -248,27 +245,27 @@ void answer::tune(const Question& question) {
     client.error(message.address, "busy: too many loads are waiting; try again");
     return;
   }
-  question.session.tune(*target,
-                        [message, client](const Result<std::shared_ptr<const Loaded>>& result) {
-                          client.outlet().end_load();
-                          Reply reply(result ? "/done" : "/fail");
-                          reply.text(message.address);
-                          if (!result) {
-                            reply.text(without_source(result.error().message));
-                          }
-                          client.answer(reply);
-                        });
+  query.session.tune(*target,
+                     [message, client](const Result<std::shared_ptr<const Loaded>>& result) {
+                       client.outlet().end_load();
+                       Reply reply(result ? "/done" : "/fail");
+                       reply.text(message.address);
+                       if (!result) {
+                         reply.text(without_source(result.error().message));
+                       }
+                       client.answer(reply);
+                     });
 }
 
-void answer::shape(const Question& question) {
-  const Message& message = question.message;
-  const OscClient& client = question.client;
+void answer::shape(const Query& query) {
+  const Message& message = query.message;
+  const OscClient& client = query.client;
   const auto targets = timbre_targets(message.arguments);
   if (!targets) {
     client.error(message.address, targets.error().message);
     return;
   }
-  question.session.shape(*targets, [message, client](const Result<Shaped>& shaped) {
+  query.session.shape(*targets, [message, client](const Result<Shaped>& shaped) {
     Reply reply(shaped ? "/done" : "/fail");
     reply.text(message.address);
     if (!shaped) {
@@ -288,21 +285,21 @@ void answer::shape(const Question& question) {
   });
 }
 
-void answer::subscribe(const Question& question) {
-  lease(question, Subscribers::News::changes, "/subscribe.reply");
+void answer::subscribe(const Query& query) {
+  lease(query, Subscribers::News::changes, "/subscribe.reply");
 }
 
-void answer::timbre(const Question& question) {
-  if (const auto lent_s = lease(question, Subscribers::News::timbre, "/timbre.reply")) {
-    question.session.timbre().listen(std::chrono::duration<double>(*lent_s));
+void answer::timbre(const Query& query) {
+  if (const auto lent_s = lease(query, Subscribers::News::timbre, "/timbre.reply")) {
+    query.session.timbre().listen(std::chrono::duration<double>(*lent_s));
   }
 }
 
-void answer::unsubscribe(const Question& question) {
-  if (question.subscribers.remove(question.client)) {
-    question.client.answer(Reply("/done").text(question.message.address));
+void answer::unsubscribe(const Query& query) {
+  if (query.subscribers.remove(query.client)) {
+    query.client.answer(Reply("/done").text(query.message.address));
   } else {
-    question.client.error(question.message.address, "there was no subscription");
+    query.client.error(query.message.address, "there was no subscription");
   }
 }
 

@@ -14,11 +14,11 @@ void OscClient::send(std::vector<OscOutlet::Bytes> answers) const {
   }
 }
 
-bool OscClient::is_heard() const {
+bool OscClient::is_within_budget() const {
   if (post_ || outlet_->may_answer(sender_)) {
     return true;
   }
-  if (const double pause_s = outlet_->tell_pause_s(sender_); pause_s > 0.0) {
+  if (const double pause_s = outlet_->reply_pause_s(sender_); pause_s > 0.0) {
     const double ms = std::ceil(1e3 * pause_s);
     outlet_->answer(sender_, {Reply("/error")
                                   .text("")
@@ -30,18 +30,18 @@ bool OscClient::is_heard() const {
 }
 
 void OscClient::answer(const Reply& reply) const {
-  if (is_heard()) {
+  if (is_within_budget()) {
     send({reply.bytes()});
   }
 }
 
 void OscClient::error(const std::string& about, const std::string& message) const {
   answer(Reply("/error").text(about).text(message));
-  outlet_->tell_failure("OSC: " + (message.starts_with(about) ? "" : about + ": ") + message);
+  outlet_->log_failure("OSC: " + (message.starts_with(about) ? "" : about + ": ") + message);
 }
 
 bool OscClient::may_have_rows(const std::string& about) const {
-  if (!is_heard()) {
+  if (!is_within_budget()) {
     return false;
   }
   if (!outlet_->has_room()) {

@@ -39,7 +39,7 @@ class OscClient {
  private:
   // Returns whether replies to this client are within the limit; if not, the client gets one
   // message.
-  bool is_heard() const;
+  bool is_within_budget() const;
   void send(std::vector<OscOutlet::Bytes> answers) const;
 
   std::shared_ptr<OscOutlet> outlet_;

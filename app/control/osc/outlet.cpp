@@ -20,7 +20,7 @@ constexpr std::int64_t portion_ns = 5'000'000;
 
 }  // namespace
 
-OscOutlet::OscOutlet(int socket, Tell tell) : socket_(socket), tell_(std::move(tell)) {}
+OscOutlet::OscOutlet(int socket, Log log) : socket_(socket), log_(std::move(log)) {}
 
 OscOutlet::~OscOutlet() {
   close();
@@ -36,9 +36,9 @@ bool OscOutlet::may_answer(const OscSender& to) {
   return budget_.may_answer(to, monotonic_ns());
 }
 
-double OscOutlet::tell_pause_s(const OscSender& to) {
+double OscOutlet::reply_pause_s(const OscSender& to) {
   const std::lock_guard lock(mutex_);
-  return budget_.tell_pause_s(to, monotonic_ns());
+  return budget_.reply_pause_s(to, monotonic_ns());
 }
 
 bool OscOutlet::has_room() {
@@ -97,13 +97,13 @@ void OscOutlet::send(const OscSender& to, const Bytes& bytes) {
          sizeof address);
 }
 
-void OscOutlet::tell(const std::string& news) const {
-  if (tell_) {
-    tell_(news);
+void OscOutlet::log(const std::string& news) const {
+  if (log_) {
+    log_(news);
   }
 }
 
-void OscOutlet::tell_failure(const std::string& news) {
+void OscOutlet::log_failure(const std::string& news) {
   std::optional<std::string> due;
   {
     const std::lock_guard lock(mutex_);
@@ -111,7 +111,7 @@ void OscOutlet::tell_failure(const std::string& news) {
     due = failures_.take();
   }
   if (due) {
-    tell(*due);
+    log(*due);
   }
 }
 

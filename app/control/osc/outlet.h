@@ -19,11 +19,11 @@ namespace ressort::control {
 class OscOutlet {
  public:
   using Bytes = std::vector<std::uint8_t>;
-  using Tell = std::function<void(const std::string&)>;
+  using Log = std::function<void(const std::string&)>;
 
-  // Takes ownership of the socket. `tell` receives messages for the local user, on any thread; it
+  // Takes ownership of the socket. `log` receives messages for the local user, on any thread; it
   // must outlive the session.
-  OscOutlet(int socket, Tell tell);
+  OscOutlet(int socket, Log log);
   ~OscOutlet();
   OscOutlet(const OscOutlet&) = delete;
   OscOutlet& operator=(const OscOutlet&) = delete;
@@ -31,7 +31,7 @@ class OscOutlet {
   // All of these: [any thread but audio]
   void received(const OscSender& from, std::size_t bytes);
   bool may_answer(const OscSender& to);      // Applies AnswerBudget.
-  double tell_pause_s(const OscSender& to);  // Applies AnswerBudget.
+  double reply_pause_s(const OscSender& to);  // Applies AnswerBudget.
   // Returns whether there is room for a reply of many rows.
   bool has_room();
   // Queues replies in this order. Long ones are sent in portions, because a receiver's buffer is
@@ -41,9 +41,9 @@ class OscOutlet {
   // the next one in ms, or -1 for none.
   int send_due();
 
-  void tell(const std::string& news) const;
+  void log(const std::string& news) const;
   // Logs a failure in more detail than the client may see; rate-limited.
-  void tell_failure(const std::string& news);
+  void log_failure(const std::string& news);
   // Stops sending.
   void close();
 
@@ -61,7 +61,7 @@ class OscOutlet {
 
   std::mutex mutex_;
   int socket_;
-  const Tell tell_;
+  const Log log_;
   AnswerBudget budget_;
   // Keyed by address and port.
   std::map<std::pair<std::uint32_t, std::uint16_t>, Waiting> waiting_;

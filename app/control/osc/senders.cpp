@@ -129,7 +129,7 @@ void AnswerBudget::answered(const OscSender& to, std::size_t bytes, std::int64_t
   account(to, now_ns).bytes -= static_cast<double>(bytes);
 }
 
-double AnswerBudget::tell_pause_s(const OscSender& to, std::int64_t now_ns) {
+double AnswerBudget::reply_pause_s(const OscSender& to, std::int64_t now_ns) {
   Account& account = this->account(to, now_ns);
   const bool tells = account.bytes <= 0.0 && !account.was_informed;
   account.was_informed = account.was_informed || tells;

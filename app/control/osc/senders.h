@@ -52,7 +52,7 @@ class AnswerBudget {
   void answered(const OscSender& to, std::size_t bytes, std::int64_t now_ns);
 
   // Returns the time until replies resume; 0 if the client has already been told.
-  double tell_pause_s(const OscSender& to, std::int64_t now_ns);
+  double reply_pause_s(const OscSender& to, std::int64_t now_ns);
 
   std::size_t senders() const { return accounts_.size(); }
 

@@ -60,13 +60,13 @@ struct OscServer::Server {
   };
 
   Server(Process& process_in, Session& session_in, int socket_in, int wake_in,
-         std::vector<Subnet> allowed_in, OscOutlet::Tell tell)
+         std::vector<Subnet> allowed_in, OscOutlet::Log log)
       : process(process_in),
         session(session_in),
         socket(socket_in),
         wake(wake_in),
         allowed(std::move(allowed_in)),
-        outlet(std::make_shared<OscOutlet>(socket_in, std::move(tell))),
+        outlet(std::make_shared<OscOutlet>(socket_in, std::move(log))),
         thread([this] { run(); }) {}
 
   ~Server() {
@@ -82,7 +82,7 @@ struct OscServer::Server {
     std::array<pollfd, 2> waits{{{socket, POLLIN, 0}, {wake, POLLIN, 0}}};
     while (true) {
       const int due_ms = outlet->send_due();
-      const int changes_ms = subscribers.tell(session, monotonic_ns());
+      const int changes_ms = subscribers.send_changes(session, monotonic_ns());
       const int wait_ms =
           due_ms < 0 || (changes_ms >= 0 && changes_ms < due_ms) ? changes_ms : due_ms;
       if (poll(waits.data(), waits.size(), wait_ms) < 0) {
@@ -139,7 +139,7 @@ struct OscServer::Server {
     strangers.add("OSC: a packet from " + address + " was ignored; --osc-allow " + address +
                   " lets it in");
     if (const auto news = strangers.take()) {
-      outlet->tell(*news);
+      outlet->log(*news);
     }
   }
 
@@ -289,7 +289,7 @@ OscServer::OscServer(std::unique_ptr<Server> server) : server_(std::move(server)
 OscServer::~OscServer() = default;
 
 Result<std::unique_ptr<OscServer>> OscServer::open(const OscOptions& options, Process& process,
-                                                   Session& session, Tell tell) {
+                                                   Session& session, Log log) {
   const auto allowed = allowed_senders(options);
   if (!allowed) {
     return allowed.error();
@@ -305,17 +305,17 @@ Result<std::unique_ptr<OscServer>> OscServer::open(const OscOptions& options, Pr
     return Error{"OSC cannot start: " + reason};
   }
   return std::unique_ptr<OscServer>(new OscServer(
-      std::make_unique<Server>(process, session, *socket, wake, *allowed, std::move(tell))));
+      std::make_unique<Server>(process, session, *socket, wake, *allowed, std::move(log))));
 }
 
-Result<std::unique_ptr<OscServer>> OscServer::open_unheard(Process& process, Session& session,
-                                                           Tell tell) {
+Result<std::unique_ptr<OscServer>> OscServer::open_without_udp(Process& process, Session& session,
+                                                               Log log) {
   const int wake = eventfd(0, EFD_CLOEXEC);
   if (wake < 0) {
     return Error{"OSC cannot start: " + std::generic_category().message(errno)};
   }
-  return std::unique_ptr<OscServer>(new OscServer(std::make_unique<Server>(
-      process, session, -1, wake, std::vector<Subnet>(), std::move(tell))));
+  return std::unique_ptr<OscServer>(new OscServer(
+      std::make_unique<Server>(process, session, -1, wake, std::vector<Subnet>(), std::move(log))));
 }
 
 OscServer::Packets OscServer::ask(std::vector<std::uint8_t> packet,
@@ -349,7 +349,7 @@ OscServer::Packets OscServer::ask(std::vector<std::uint8_t> packet,
   return std::move(mailbox->answers);
 }
 
-bool OscServer::is_heard() const {
+bool OscServer::listens_on_udp() const {
   return server_->socket >= 0;
 }
 

@@ -16,15 +16,15 @@ namespace ressort::control {
 
 class OscServer {
  public:
-  using Tell = std::function<void(const std::string&)>;
+  using Log = std::function<void(const std::string&)>;
 
-  // Opens the socket and starts the thread; fails if the port is in use. `tell` receives messages
+  // Opens the socket and starts the thread; fails if the port is in use. `log` receives messages
   // about faulty packets, on any thread; it must outlive the session. [control]
   static Result<std::unique_ptr<OscServer>> open(const OscOptions& options, Process& process,
-                                                 Session& session, Tell tell);
+                                                 Session& session, Log log);
   // Starts the thread without UDP; only ask() reaches it.
-  static Result<std::unique_ptr<OscServer>> open_unheard(Process& process, Session& session,
-                                                         Tell tell);
+  static Result<std::unique_ptr<OscServer>> open_without_udp(Process& process, Session& session,
+                                                             Log log);
   ~OscServer();
 
   // Executes a packet as if it came from this machine, and returns its replies. Later replies, for
@@ -33,7 +33,7 @@ class OscServer {
   using Packets = std::vector<std::vector<std::uint8_t>>;
   Packets ask(std::vector<std::uint8_t> packet, std::function<void(Packets)> later);
 
-  bool is_heard() const;  // True if it listens on UDP.
+  bool listens_on_udp() const;  // True if it listens on UDP.
   int port() const;       // The port in use; differs from the requested one only if that was 0.
   std::string access() const;  // Describes who may send.
 

@@ -48,7 +48,7 @@ bool Subscribers::remove(const OscClient& client) {
          }) > 0;
 }
 
-int Subscribers::tell(Session& session, std::int64_t now_ns) {
+int Subscribers::send_changes(Session& session, std::int64_t now_ns) {
   std::erase_if(all_, [&](const Subscriber& subscriber) { return subscriber.until_ns <= now_ns; });
   const auto wants = [&](News news) {
     return std::any_of(all_.begin(), all_.end(),

@@ -27,7 +27,7 @@ class Subscribers {
   // else the changed ones as "/param/NAME VALUE". A new subscriber gets everything. Every new
   // timbre frame is sent as "/timbre.frame NUMBER FIGURE...", with the figures before the harmonic
   // ones; an absent figure is 0. Returns the time until the next call in ms, or -1 for never.
-  int tell(Session& session, std::int64_t now_ns);
+  int send_changes(Session& session, std::int64_t now_ns);
 
  private:
   struct Subscriber {

@@ -209,7 +209,7 @@ Result<Shaped> shape_timbre(const ShapeRequest& request, std::vector<TimbreTarge
   shaped.targets = targets;
   auto found = ask_timbre(asked_model(model, StruckAs::lines), request.values, free, targets,
                           {.exactly = asked_model(model, StruckAs::samples),
-                           .tell = request.tell,
+                           .on_progress = request.on_progress,
                            .progress = request.progress});
   if (!found) {
     return found.error().message == stopped ? found.error()

@@ -28,7 +28,7 @@ struct ShapeRequest {
   int key = 57;                                  // the key whose timbre is adjusted
   double rate_hz = Network::reference_rate_hz;
   Progress progress = {};
-  std::function<void(double share)> tell = {};
+  std::function<void(double share)> on_progress = {};
 };
 
 struct Shaped {

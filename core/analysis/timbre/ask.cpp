@@ -315,7 +315,7 @@ class Search {
     std::vector<MeterReader::Trial> far;
     int start = 0;
     for (; start < options_.starts && !is_there(); ++start) {
-      tell(start);
+      report(start);
       Place place = asker_.place_of_values();
       for (std::size_t i = 0; start > 0 && i < free_.size(); ++i) {
         place[i] = next_share(random_);
@@ -349,9 +349,9 @@ class Search {
  private:
   bool is_there() const { return best_ && best_->is_there(); }
 
-  void tell(int start) const {
-    if (options_.tell) {
-      options_.tell(static_cast<double>(start) / options_.starts);
+  void report(int start) const {
+    if (options_.on_progress) {
+      options_.on_progress(static_cast<double>(start) / options_.starts);
     }
   }
 

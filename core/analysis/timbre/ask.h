@@ -45,7 +45,8 @@ struct AskOptions {
   int starts = 8;  // The first start is the current parameters, the others are random.
   std::optional<AskedModel> exactly;            // Refines and judges the best result, if given.
   std::uint64_t seed = 1;                       // Seed of the random starts.
-  std::function<void(double share)> tell = {};  // Reports progress from 0 to 1 as starts finish.
+  std::function<void(double share)> on_progress =
+      {};  // Reports progress from 0 to 1 as starts finish.
   Progress progress = {};
 };
 

@@ -70,7 +70,7 @@ struct SamSignal {
 // Translates one text.
 class SamTranslator {
  public:
-  Translation tell(std::string_view text, const Progress& progress);
+  Translation translate(std::string_view text, const Progress& progress);
 
  private:
   void declare();
@@ -171,7 +171,7 @@ std::size_t length_of(const SamSignal& heard) {
   return length;
 }
 
-Translation SamTranslator::tell(std::string_view text, const Progress& progress) {
+Translation SamTranslator::translate(std::string_view text, const Progress& progress) {
   progress.stage("reading it");
   lines_.read(text, progress);
   declare();
@@ -810,7 +810,7 @@ void SamTranslator::write_output(const SamElement& element) {
 }  // namespace
 
 Translation translate_synth_a_modeler(std::string_view text, const Progress& progress) {
-  return SamTranslator().tell(text, progress);
+  return SamTranslator().translate(text, progress);
 }
 
 }  // namespace ressort::model

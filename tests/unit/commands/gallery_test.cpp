@@ -83,7 +83,7 @@ TEST_CASE("A spectrogram shows the frequency and the level of a sinusoid", "[gal
   CHECK(std::fabs(shown.at(row, 10) - 20.0 * std::log10(0.5)) < 0.05);
   CHECK(shown.at(row + 12, 10) < -60.0);
   CHECK(shown.at(row - 12, 10) < -60.0);
-  const Spectrogram small = made_smaller(shown, 55, 10);
+  const Spectrogram small = downsampled(shown, 55, 10);
   CHECK(small.at(row / 2, 5) == std::max({shown.at(60, 10), shown.at(60, 11), shown.at(59, 10),
                                           shown.at(59, 11), shown.at(61, 10), shown.at(61, 11)}));
 }

@@ -149,10 +149,10 @@ TEST_CASE("A track may end without an end-of-track event", "[midi_file]") {
 }
 
 TEST_CASE("The extension of a MIDI file may be in any case", "[midi_file]") {
-  CHECK(names_midi_file("a/song.mid"));
-  CHECK(names_midi_file("SONG.MIDI"));
-  CHECK_FALSE(names_midi_file("song.mdl"));
-  CHECK_FALSE(names_midi_file("mid"));
+  CHECK(is_midi_file_name("a/song.mid"));
+  CHECK(is_midi_file_name("SONG.MIDI"));
+  CHECK_FALSE(is_midi_file_name("song.mdl"));
+  CHECK_FALSE(is_midi_file_name("mid"));
 }
 
 TEST_CASE("A rendered MIDI file starts at its frame and ends in silence", "[midi_file]") {

@@ -337,7 +337,7 @@ TEST_CASE("the letter keys play notes", "[console]") {
   std::string typed = "awzsxKq";
   typed.insert(2, 1, '\0');  // A second without a key.
   std::size_t given = 0;
-  harness.console.lend_keyboard([&](const auto& on_key) {
+  harness.console.set_keyboard([&](const auto& on_key) {
     while (given < typed.size() && on_key(typed[given++])) {
     }
   });

@@ -178,7 +178,7 @@ TEST_CASE("replies are limited to the bytes received plus a budget", "[osc_acces
         answered += answer;
       }
       pauses += was_heard && !is_heard ? 1 : 0;
-      tellings += !is_heard && budget.tell_pause_s(sender, t * ms) > 0.0 ? 1 : 0;
+      tellings += !is_heard && budget.reply_pause_s(sender, t * ms) > 0.0 ? 1 : 0;
       was_heard = is_heard;
     }
   }
@@ -193,15 +193,15 @@ TEST_CASE("a started reply is sent whole and charged to the budget", "[osc_acces
   AnswerBudget budget;
   const OscSender sender{0x0a000001, 4000};
   CHECK(budget.may_answer(sender, 0));
-  CHECK(budget.tell_pause_s(sender, 0) == 0.0);
+  CHECK(budget.reply_pause_s(sender, 0) == 0.0);
   budget.answered(sender, 3 * 65536, 0);
   CHECK_FALSE(budget.may_answer(sender, 0));
-  CHECK(budget.tell_pause_s(sender, 0) == 2.0);
-  CHECK(budget.tell_pause_s(sender, 1) == 0.0);
+  CHECK(budget.reply_pause_s(sender, 0) == 2.0);
+  CHECK(budget.reply_pause_s(sender, 1) == 0.0);
   CHECK_FALSE(budget.may_answer(sender, 2000 * ms - 1));
   CHECK(budget.may_answer(sender, 2001 * ms));
   budget.answered(sender, 1000, 2001 * ms);
-  CHECK(budget.tell_pause_s(sender, 2001 * ms) > 0.0);
+  CHECK(budget.reply_pause_s(sender, 2001 * ms) > 0.0);
 }
 
 TEST_CASE("remote ports share a budget, local ports have their own", "[osc_access]") {

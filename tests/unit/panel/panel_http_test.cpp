@@ -97,7 +97,7 @@ struct Stage {
         std::this_thread::sleep_for(2ms);
       }
     });
-    auto opened = OscServer::open_unheard(process, session, {});
+    auto opened = OscServer::open_without_udp(process, session, {});
     REQUIRE(opened);
     osc = *std::move(opened);
     auto made = WebPanel::open(options, process, session, motion, *osc);
