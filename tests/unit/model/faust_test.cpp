@@ -68,7 +68,7 @@ TEST_CASE("an export has one line for each mass and link", "[faust]") {
   has(text, "process = model ~ par(i, 2, _) : par(i, 2, !), par(i, 3, _);\n");
 }
 
-TEST_CASE("coefficients follow the sample rate unless rescaling is off", "[faust]") {
+TEST_CASE("exported coefficients follow the sample rate unless rescaling is off", "[faust]") {
   has(exported(swing), "\nr = 44100.0/fconstant(int fSamplingFreq, <math.h>);");
   has(exported(swing, false), "\nr = 1.0;");
 }
