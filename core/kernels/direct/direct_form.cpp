@@ -17,12 +17,17 @@ double operations(const Program& program, const Direct&, const Workload& load) {
   const double widest = static_cast<double>(vector_bytes(load.isa)) / bytes_of_number(load);
   const double lanes = std::ceil(load.voices / widest) * std::min<double>(load.voices, widest);
   const LinkCount links = links_of(program);
-  double count = 48.0 + 3.0 * program.moving + 4.0 * (links.springs + links.bent) +
-                 16.0 * links.others + 1.5 * passive_operations(program) +
-                 6.0 * static_cast<double>(program.waveguides.size() + program.junctions.size());
+  // More than half a register is filled: the pack moves twice the bytes, mass by mass and link by
+  // link.
+  const double width = lanes > widest / 2.0 ? 1.4 : 1.0;
+  double count =
+      48.0 +
+      width * (3.0 * program.moving + 4.0 * (links.springs + links.bent) + 16.0 * links.others) +
+      1.5 * passive_operations(program) +
+      6.0 * static_cast<double>(program.waveguides.size() + program.junctions.size());
   double places = 0.0;
   for (const TapSlot& tap : program.taps) {
-    (tap.is_on_body() ? count : places) += tap.is_on_body() ? 5.0 * tap.length : 100.0;
+    (tap.is_on_body() ? count : places) += tap.is_on_body() ? 5.0 * tap.length : 125.0;
   }
   const double numbers = 3.0 * std::max(2.0, std::min<double>(load.voices, widest));
   const double bytes = numbers * bytes_of_number(load) * program.moving +
