@@ -47,7 +47,7 @@ class alignas(64) InputDriver {
   }
 
   // Multiplies the speed of a draw, to follow a change of the voice's pitch.
-  void hasten(double ratio) {
+  void scale_speed(double ratio) {
     if (motion_ == Motion::draw) {
       speed_ *= ratio;
     }

@@ -74,7 +74,7 @@ void add_method(CLI::App& command, std::optional<Method>& method) {
   }
   command
       .add_option_function<std::string>(
-          "--method", [&method](const std::string& word) { method = method_called(word); },
+          "--method", [&method](const std::string& word) { method = method_named(word); },
           "method of computation: " + all)
       ->check([](const std::string& word) { return removed_method_advice(word); })
       ->check(CLI::IsMember(words).description(""))

@@ -23,29 +23,29 @@ const char* const shape_examples =
     "  ressort shape my.mdl --f0 220 --inharmonicity 0.02 -o stiff.toml\n"
     "  ressort shape PolyTriangle --like bell.wav -o like_a_bell.toml\n";
 
-const char* help_of(AskedFigure figure) {
+const char* help_of(TargetFigure figure) {
   switch (figure) {
-    case AskedFigure::f0:
+    case TargetFigure::f0:
       return "lowest audible mode in Hz, of models without keys";
-    case AskedFigure::t60:
+    case TargetFigure::t60:
       return "T60 of the pitch in s: short or long";
-    case AskedFigure::centroid:
+    case TargetFigure::centroid:
       return "spectral centroid in Hz: dark or bright";
-    case AskedFigure::spread:
+    case TargetFigure::spread:
       return "spectral spread in Hz: narrow or wide";
-    case AskedFigure::inharmonicity:
+    case TargetFigure::inharmonicity:
       return "inharmonicity: harmonic or bell-like";
-    case AskedFigure::odd_to_even:
+    case TargetFigure::odd_to_even:
       return "energy ratio of odd to even partials: full or hollow";
-    case AskedFigure::rolloff:
+    case TargetFigure::rolloff:
       return "frequency below which 95 % of the energy is, in Hz";
-    case AskedFigure::skewness:
+    case TargetFigure::skewness:
       return "spectral skewness";
-    case AskedFigure::kurtosis:
+    case TargetFigure::kurtosis:
       return "spectral kurtosis: flat or peaked; 3 for a normal curve";
-    case AskedFigure::slope:
+    case TargetFigure::slope:
       return "slope of the regression line of the spectrum, in 1/Hz";
-    case AskedFigure::attack:
+    case TargetFigure::attack:
       return "attack time in ms: sudden or slow";
   }
   return "";
@@ -61,7 +61,7 @@ void add_shape(CLI::App& app, ShapeOptions& options, int& code) {
   add_output(*command, options.output, "preset to write, a .toml file");
   add_overwrite(*command, options.force);
   command->add_flag("--json", options.as_json, "print JSON");
-  for (const AskedFigureRow& row : asked_figure_rows()) {
+  for (const TargetFigureRow& row : target_figure_rows()) {
     std::string name = "--" + short_name(row.figure);
     std::replace(name.begin(), name.end(), '_', '-');
     command
@@ -71,7 +71,7 @@ void add_shape(CLI::App& app, ShapeOptions& options, int& code) {
               double value = 0.0;
               const double asked =
                   parse_number(text, value) ? value : std::numeric_limits<double>::quiet_NaN();
-              if (const auto wrong = wrong_with(figure, asked); !wrong.empty()) {
+              if (const auto wrong = target_error(figure, asked); !wrong.empty()) {
                 throw CLI::ValidationError(name, std::string(wrong) + ", found " + text);
               }
               options.targets.push_back({figure, value});
@@ -94,7 +94,7 @@ void add_shape(CLI::App& app, ShapeOptions& options, int& code) {
     for (std::string word : command->remaining()) {
       if (word.starts_with("--")) {
         std::replace(word.begin() + 2, word.end(), '-', '_');
-        throw CLI::ValidationError("shape", asked_figure(word.substr(2)).error().message);
+        throw CLI::ValidationError("shape", parse_target_figure(word.substr(2)).error().message);
       }
     }
     if (!command->remaining().empty()) {

@@ -302,7 +302,7 @@ std::vector<std::string> Console::completions(std::string_view line) const {
       words.push_back(info.moves.empty() ? info.name : info.name + ":2");
     }
   } else if (kind == "FIGURE") {
-    for (const AskedFigureRow& figure : asked_figure_rows()) {
+    for (const TargetFigureRow& figure : target_figure_rows()) {
       words.push_back(short_name(figure.figure));
     }
   } else if (kind == "MODEL" || kind == "PRESET") {

@@ -43,7 +43,7 @@ Result<std::vector<TimbreTarget>> timbre_targets(std::span<const Argument> argum
     if (word == nullptr || value == nullptr) {
       return Error{"expected a figure's name and then a number: centroid 1800 t60 3"};
     }
-    const auto figure = asked_figure(*word);
+    const auto figure = parse_target_figure(*word);
     if (!figure) {
       return figure.error();
     }

@@ -16,9 +16,10 @@ constexpr double rounding = 1e-9;
 
 bool is_usable(const Weights& weights) {
   const auto finite = [](double w) { return std::isfinite(w); };
-  return !weights.feeds && std::all_of(weights.masses.begin(), weights.masses.end(), [](double m) {
-    return m > 0.0 && std::isfinite(m);
-  }) && std::all_of(weights.terms.begin(), weights.terms.end(), finite);
+  return !weights.gains_energy &&
+         std::all_of(weights.masses.begin(), weights.masses.end(),
+                     [](double m) { return m > 0.0 && std::isfinite(m); }) &&
+         std::all_of(weights.terms.begin(), weights.terms.end(), finite);
 }
 
 std::vector<double> diagonal(const Weights& weights, double limit) {
@@ -77,7 +78,7 @@ bool BoundaryFinder::holds(const Weights& weights, double limit) {
 }
 
 bool BoundaryFinder::fails(const Weights& weights) {
-  if (!is_exact() || weights.feeds) {
+  if (!is_exact() || weights.gains_energy) {
     return false;
   }
   return assembly_.wandering_ends == 0 || !is_usable(weights) ||

@@ -14,7 +14,7 @@ namespace ressort::analysis {
 struct Weights {
   std::vector<double> masses;  // [row]
   std::vector<double> terms;   // [term] Its w.
-  bool feeds = false;          // A negative stiffness or damping makes the motion grow.
+  bool gains_energy = false;   // A negative stiffness or damping makes the motion grow.
 };
 
 // The weights along a line, for example while one parameter moves.

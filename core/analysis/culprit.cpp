@@ -12,16 +12,17 @@ namespace {
 
 // Returns the argument slot of a link's stiffness or damping. Of two stiffnesses, the larger one or
 // the negative one.
-std::size_t slot_of(const Link& link, Quantity quantity, bool feeds,
+std::size_t slot_of(const Link& link, Quantity quantity, bool gains_energy,
                     std::span<const Range> arguments) {
   const LawFacts& law = facts_of(link.law);
   if (quantity != Quantity::stiffness || !law.has(Role::stiffness)) {
     return law.slot(Role::damping);
   }
   const auto range = [&](Role role) { return range_at(arguments, link.arguments[law.slot(role)]); };
-  const bool is_limit = law.has(Role::limit) &&
-                        (feeds ? range(Role::limit).lowest < 0.0
-                               : !(range(Role::stiffness).highest > range(Role::limit).highest));
+  const bool is_limit =
+      law.has(Role::limit) &&
+      (gains_energy ? range(Role::limit).lowest < 0.0
+                    : !(range(Role::stiffness).highest > range(Role::limit).highest));
   return law.slot(is_limit ? Role::limit : Role::stiffness);
 }
 
@@ -39,7 +40,8 @@ std::string described(const Culprit& culprit) {
 }  // namespace
 
 // Finds a mass that is not above 0, or an argument that is not finite.
-std::optional<Proofs::Suspect> Proofs::nonsense(std::span<const Range> arguments) const {
+std::optional<Proofs::Suspect> Proofs::find_invalid_number_in(
+    std::span<const Range> arguments) const {
   for (std::size_t row = 0; row < assembly_.masses.size(); ++row) {
     const Range mass = range_at(arguments, network_.masses[assembly_.masses[row]].mass);
     if (!(mass.lowest > 0.0 && std::isfinite(mass.highest))) {
@@ -71,8 +73,8 @@ Proofs::Suspect Proofs::heavier_part(std::size_t term, std::span<const Range> ar
 }
 
 // Finds the link with the most energy in the unstable motion.
-Proofs::Suspect Proofs::weakest(const Weights& weights, std::span<const Range> arguments,
-                                std::span<const double> shape) const {
+Proofs::Suspect Proofs::find_worst_link(const Weights& weights, std::span<const Range> arguments,
+                                        std::span<const double> shape) const {
   if (shape.empty()) {
     return heavier_part(edge_bound(assembly_, weights).term, arguments);
   }
@@ -89,8 +91,8 @@ Proofs::Suspect Proofs::weakest(const Weights& weights, std::span<const Range> a
 }
 
 // Finds a mass that moves almost alone: it may be too light for its links together.
-std::optional<Proofs::Suspect> Proofs::lightest(const Weights& weights,
-                                                std::span<const double> shape) const {
+std::optional<Proofs::Suspect> Proofs::find_lightest_mass(const Weights& weights,
+                                                          std::span<const double> shape) const {
   std::vector<double> inertia;
   for (std::size_t i = 0; i < shape.size(); ++i) {
     inertia.push_back(weights.masses[i] * shape[i] * shape[i]);
@@ -109,7 +111,7 @@ ArgumentId Proofs::argument_of(const Suspect& suspect, std::span<const Range> ar
   const Assembly::Term& term = assembly_.terms[suspect.index];
   if (term.is_link) {
     const Link& link = network_.links[term.element];
-    return link.arguments[slot_of(link, suspect.quantity, suspect.feeds, arguments)];
+    return link.arguments[slot_of(link, suspect.quantity, suspect.gains_energy, arguments)];
   }
   const Mass& mass = network_.masses[term.element];
   return suspect.quantity == Quantity::stiffness ? mass.stiffness : mass.damping;
@@ -149,7 +151,7 @@ Culprit Proofs::accuse(const Suspect& suspect, std::span<const Range> arguments)
     culprit.argument = print_expression(network_.arguments[argument], names);
     const Range range = arguments[argument];
     const bool is_lowest =
-        suspect.quantity == Quantity::mass || suspect.feeds || range.highest <= 0.0;
+        suspect.quantity == Quantity::mass || suspect.gains_energy || range.highest <= 0.0;
     culprit.value = is_lowest ? range.lowest : range.highest;
   }
   culprit.others = users(suspect, arguments) - 1;
@@ -164,7 +166,7 @@ std::size_t Proofs::users(const Suspect& suspect, std::span<const Range> argumen
       suspect.quantity == Quantity::mass ? assembly_.masses.size() : assembly_.terms.size();
   std::set<std::pair<int, int>> places;
   for (std::size_t i = 0; i < count; ++i) {
-    const Suspect other{suspect.quantity, i, suspect.feeds};
+    const Suspect other{suspect.quantity, i, suspect.gains_energy};
     if (argument_of(other, arguments) == argument) {
       places.insert({location_of(other).line, location_of(other).column});
     }
@@ -179,7 +181,7 @@ std::optional<double> Proofs::limit(const Suspect& suspect, std::span<const Rang
     return std::nullopt;
   }
   const auto line = [&](double value) {
-    return weigh(arguments, {suspect.quantity, argument, value});
+    return weights_for(arguments, {suspect.quantity, argument, value});
   };
   if (suspect.quantity != Quantity::mass) {
     if (!boundary_.holds(line(0.0), 4.0)) {

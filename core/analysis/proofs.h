@@ -27,7 +27,7 @@ class Proofs {
  private:
   // Replaces the range of an argument for one quantity. The same text may be a stiffness in one
   // place and a damping in another; only the one quantity changes.
-  struct Instead {
+  struct RangeOverride {
     Quantity quantity = Quantity::stiffness;
     ArgumentId argument = no_argument;
     double value = 0.0;
@@ -36,25 +36,26 @@ class Proofs {
   struct Suspect {
     Quantity quantity = Quantity::stiffness;
     std::size_t index = 0;
-    bool feeds = false;  // Unstable because it is negative, not because it is too large.
+    bool gains_energy = false;  // Unstable because it is negative, not because it is too large.
   };
   enum class Course { flat, straight, bent };
 
   std::vector<Load> loads(std::span<const Range> arguments) const;
   std::vector<Load> lowest_loads(std::span<const Range> arguments) const;
-  Weights weigh(std::span<const Range> arguments);
-  Weights weigh(std::span<const Range> arguments, const Instead& instead);
-  bool feeds(std::span<const Range> arguments);
+  Weights weights_for(std::span<const Range> arguments);
+  Weights weights_for(std::span<const Range> arguments, const RangeOverride& instead);
+  bool gains_energy(std::span<const Range> arguments);
   bool is_positive(std::span<const double> terms);
   Course course_along(std::size_t parameter) const;
   SafeRange range_around(const WeightLine& line, double anchor);
 
   // Defined in culprit.cpp.
-  std::optional<Suspect> nonsense(std::span<const Range> arguments) const;
+  std::optional<Suspect> find_invalid_number_in(std::span<const Range> arguments) const;
   Suspect feeder(std::span<const Range> arguments) const;
-  Suspect weakest(const Weights& weights, std::span<const Range> arguments,
-                  std::span<const double> shape) const;
-  std::optional<Suspect> lightest(const Weights& weights, std::span<const double> shape) const;
+  Suspect find_worst_link(const Weights& weights, std::span<const Range> arguments,
+                          std::span<const double> shape) const;
+  std::optional<Suspect> find_lightest_mass(const Weights& weights,
+                                            std::span<const double> shape) const;
   Suspect heavier_part(std::size_t term, std::span<const Range> arguments) const;
   Culprit accuse(const Suspect& suspect, std::span<const Range> arguments) const;
   ArgumentId argument_of(const Suspect& suspect, std::span<const Range> arguments) const;

@@ -77,7 +77,7 @@ std::vector<Load> Proofs::lowest_loads(std::span<const Range> arguments) const {
   return all;
 }
 
-Weights Proofs::weigh(std::span<const Range> arguments) {
+Weights Proofs::weights_for(std::span<const Range> arguments) {
   Weights weights;
   for (const std::uint32_t mass : assembly_.masses) {
     weights.masses.push_back(range_at(arguments, network_.masses[mass].mass).lowest);
@@ -85,16 +85,16 @@ Weights Proofs::weigh(std::span<const Range> arguments) {
   for (const Load& load : loads(arguments)) {
     weights.terms.push_back(load.total());
   }
-  weights.feeds = feeds(arguments);
+  weights.gains_energy = gains_energy(arguments);
   return weights;
 }
 
-Weights Proofs::weigh(std::span<const Range> arguments, const Instead& instead) {
+Weights Proofs::weights_for(std::span<const Range> arguments, const RangeOverride& instead) {
   std::vector<Range> changed(arguments.begin(), arguments.end());
   changed[instead.argument] = {instead.value, instead.value};
-  Weights weights = weigh(arguments);
+  Weights weights = weights_for(arguments);
   if (instead.quantity == Quantity::mass) {
-    weights.masses = weigh(changed).masses;
+    weights.masses = weights_for(changed).masses;
     return weights;
   }
   const std::vector<Load> before = loads(arguments);
@@ -109,7 +109,7 @@ Weights Proofs::weigh(std::span<const Range> arguments, const Instead& instead) 
 
 // Single terms may be negative as long as their sum is not: a spring that pushes beside one that
 // pulls. A link on a waveguide is not part of a sum.
-bool Proofs::feeds(std::span<const Range> arguments) {
+bool Proofs::gains_energy(std::span<const Range> arguments) {
   if (std::none_of(arguments.begin(), arguments.end(),
                    [](const Range& range) { return range.lowest < 0.0; })) {
     return false;
@@ -183,10 +183,10 @@ Proofs::Course Proofs::course_along(std::size_t parameter) const {
 
 Verdict Proofs::prove(const ParameterBox& box) {
   const std::vector<Range> arguments = argument_ranges(network_, box);
-  const Weights weights = weigh(arguments);
-  return boundary_.holds(weights, safe_limit)              ? Verdict::stable
-         : nonsense(arguments) || boundary_.fails(weights) ? Verdict::unstable
-                                                           : Verdict::unproved;
+  const Weights weights = weights_for(arguments);
+  return boundary_.holds(weights, safe_limit)                            ? Verdict::stable
+         : find_invalid_number_in(arguments) || boundary_.fails(weights) ? Verdict::unstable
+                                                                         : Verdict::unproved;
 }
 
 Certificate Proofs::certify(const ParameterBox& box) {
@@ -195,11 +195,11 @@ Certificate Proofs::certify(const ParameterBox& box) {
     return {.verdict = verdict};
   }
   const std::vector<Range> arguments = argument_ranges(network_, box);
-  if (const auto suspect = nonsense(arguments)) {
+  if (const auto suspect = find_invalid_number_in(arguments)) {
     return {verdict, 0.0, accuse(*suspect, arguments)};
   }
-  const Weights weights = weigh(arguments);
-  if (weights.feeds) {
+  const Weights weights = weights_for(arguments);
+  if (weights.gains_energy) {
     return {verdict, 0.0, accuse(feeder(arguments), arguments)};
   }
   const auto all_together = [&](double factor) {
@@ -211,10 +211,10 @@ Certificate Proofs::certify(const ParameterBox& box) {
   };
   const Boundary boundary = boundary_.between(all_together, 0.0, 1.0);
   // Prefers what an author would change: one link if that is enough, else the mass between several.
-  Suspect suspect = weakest(weights, arguments, boundary.shape);
+  Suspect suspect = find_worst_link(weights, arguments, boundary.shape);
   std::optional<double> enough = limit(suspect, arguments);
   if (!enough || users(suspect, arguments) > 1) {
-    const auto mass = lightest(weights, boundary.shape);
+    const auto mass = find_lightest_mass(weights, boundary.shape);
     const auto heavier =
         mass && users(*mass, arguments) == 1 ? limit(*mass, arguments) : std::nullopt;
     suspect = heavier ? *mass : suspect;
@@ -234,7 +234,7 @@ std::optional<SafeRange> Proofs::safe_range(const ParameterBox& box, std::size_t
     ParameterBox moved = box;
     moved.lowest[parameter] = std::min(side * from, side * to);
     moved.highest[parameter] = std::max(side * from, side * to);
-    return weigh(argument_ranges(network_, moved));
+    return weights_for(argument_ranges(network_, moved));
   };
   const auto holds = [&](double at) { return boundary_.holds(between(at, at), 4.0); };
   const double size = std::fabs(start);
@@ -283,14 +283,14 @@ double Proofs::share(const ParameterBox& safe, const ParameterBox& wide) {
       box.lowest.push_back(std::lerp(safe.lowest[i], wide.lowest[i], way));
       box.highest.push_back(std::lerp(safe.highest[i], wide.highest[i], way));
     }
-    return weigh(argument_ranges(network_, box));
+    return weights_for(argument_ranges(network_, box));
   };
   return boundary_.holds(line(1.0), safe_limit) ? 1.0 : boundary_.between(line, 0.0, 1.0).value;
 }
 
 double Proofs::stiffness_factor(const ParameterBox& box) {
   const std::vector<Range> arguments = argument_ranges(network_, box);
-  const Weights weights = weigh(arguments);
+  const Weights weights = weights_for(arguments);
   const std::vector<Load> all = loads(arguments);
   const auto line = [&](double factor) {
     Weights scaled = weights;

@@ -22,7 +22,7 @@ std::string counted(const LawFacts& law, std::size_t count) {
 }
 
 // Returns the first law with this name. Bows of all profiles count as bows.
-std::size_t first_called(std::string_view one) {
+std::size_t first_with_name(std::string_view one) {
   std::size_t i = 0;
   while (law_table()[i].one != one) {
     ++i;
@@ -71,7 +71,7 @@ Schemes choose_schemes(const Network& network, const Budget& budget, const Progr
       continue;
     }
     first = first == nullptr ? &link : first;
-    ++counts[first_called(facts_of(link.law).one)];
+    ++counts[first_with_name(facts_of(link.law).one)];
     if (budget.passive == Passivity::always) {
       schemes.links[i] = LinkScheme{Scheme::discrete_gradient};
     }

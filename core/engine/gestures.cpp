@@ -202,7 +202,7 @@ void Gestures::release(const Voice& voice, std::size_t lane) {
 
 void Gestures::set_pitch(std::size_t lane, double pitch) {
   for (std::size_t input = 0; input < machine_.inputs.size(); ++input) {
-    driver(lane, input).hasten(pitch / pitches_[lane]);
+    driver(lane, input).scale_speed(pitch / pitches_[lane]);
   }
   pitches_[lane] = pitch;
 }

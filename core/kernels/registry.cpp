@@ -106,7 +106,7 @@ std::string_view method_name(Method method) {
   return row_of(method).name;
 }
 
-std::optional<Method> method_called(std::string_view name) {
+std::optional<Method> method_named(std::string_view name) {
   const auto row = std::find_if(std::begin(rows), std::end(rows), [&](const KernelRow& row) {
     return row.name == name && row.use != Use::given;
   });

@@ -59,7 +59,7 @@ const KernelRow& row_of(const Form& form);
 const KernelRow& row_of(Method method);
 std::string_view method_name(Method method);
 // Returns nothing if no method has that name.
-std::optional<Method> method_called(std::string_view name);
+std::optional<Method> method_named(std::string_view name);
 // Returns what to use instead of a method that earlier versions had; empty for any other name.
 std::string removed_method_advice(std::string_view name);
 

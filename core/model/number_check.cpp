@@ -29,39 +29,39 @@ class NumberCheck {
 
   std::optional<Error> run() {
     for (const Mass& mass : network_.masses) {
-      look(mass, {{"mass", mass.mass},
-                  {"stiffness", mass.stiffness},
-                  {"damping", mass.damping},
-                  {"gravity", mass.gravity}});
+      check(mass, {{"mass", mass.mass},
+                   {"stiffness", mass.stiffness},
+                   {"damping", mass.damping},
+                   {"gravity", mass.gravity}});
       if (mass.kind == MassKind::point) {
         const Tap& tap = network_.taps[mass.tap];
-        look(mass, {{"place", tap.u}, {"place", tap.v}});
+        check(mass, {{"place", tap.u}, {"place", tap.v}});
       }
     }
     for (const Macro& macro : network_.macros) {
-      look(macro, {{"mass", macro.mass},
-                   {"stiffness", macro.stiffness},
-                   {"stiffness", macro.second_stiffness},
-                   {"damping", macro.damping},
-                   {"damping", macro.air_damping},
-                   {"impedance", macro.impedance},
-                   {"frequency", macro.frequency_hz},
-                   {"T60", macro.t60_s},
-                   {"brightness", macro.brightness}});
+      check(macro, {{"mass", macro.mass},
+                    {"stiffness", macro.stiffness},
+                    {"stiffness", macro.second_stiffness},
+                    {"damping", macro.damping},
+                    {"damping", macro.air_damping},
+                    {"impedance", macro.impedance},
+                    {"frequency", macro.frequency_hz},
+                    {"T60", macro.t60_s},
+                    {"brightness", macro.brightness}});
     }
     for (const BodyMode& mode : network_.modes) {
-      look(mode, {{"frequency", mode.frequency_hz}, {"T60", mode.t60_s}});
+      check(mode, {{"frequency", mode.frequency_hz}, {"T60", mode.t60_s}});
       look_above_zero(mode);
       look_in_range(mode);
     }
     for (const Link& link : network_.links) {
       for (const ArgumentId argument : link.arguments) {
-        look(link, {{"argument", argument}});
+        check(link, {{"argument", argument}});
       }
     }
     for (const Output& output : network_.outputs) {
-      look(Outlet{"out" + std::to_string(output.number), output.location},
-           {{"level", output.level}});
+      check(Outlet{"out" + std::to_string(output.number), output.location},
+            {{"level", output.level}});
     }
     return std::move(error_);
   }
@@ -77,7 +77,7 @@ class NumberCheck {
   };
 
   template <class Element>
-  void look(const Element& element, std::initializer_list<Asked> all) {
+  void check(const Element& element, std::initializer_list<Asked> all) {
     for (const Asked& asked : all) {
       if (error_ || asked.argument == no_argument) {
         continue;

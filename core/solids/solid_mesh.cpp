@@ -155,7 +155,7 @@ TetrahedronMesh ball_mesh(double radius, int shells) {
   return mesh;
 }
 
-std::optional<LyingBox> as_box(const ClosedSurface& closed) {
+std::optional<OrientedBox> as_box(const ClosedSurface& closed) {
   constexpr double tolerance = 1e-5;  // Relative to the size.
   const auto& points = closed.surface.points;
   if (closed.shells != 1 || points.size() < 8) {
@@ -216,14 +216,14 @@ std::optional<LyingBox> as_box(const ClosedSurface& closed) {
             return std::nullopt;
           }
         }
-        return volume > 0.0 ? LyingBox{corner, {a, b, c}} : LyingBox{corner, {a, c, b}};
+        return volume > 0.0 ? OrientedBox{corner, {a, b, c}} : OrientedBox{corner, {a, c, b}};
       }
     }
   }
   return std::nullopt;
 }
 
-std::optional<LyingBall> as_ball(const ClosedSurface& closed) {
+std::optional<DetectedBall> as_ball(const ClosedSurface& closed) {
   constexpr double tolerance = 1e-5;  // Relative to the radius.
   constexpr double round = 0.9;       // Least share of the ball's volume.
   if (closed.shells != 1 || closed.surface.points.size() < 42) {
@@ -249,7 +249,7 @@ std::optional<LyingBall> as_ball(const ClosedSurface& closed) {
   const Point3 offset =
       0.5 / volume *
       (inner(a, a) * cross(b, c) + inner(b, b) * cross(c, a) + inner(c, c) * cross(a, b));
-  const LyingBall ball{first + offset, length(offset)};
+  const DetectedBall ball{first + offset, length(offset)};
   const bool fits = std::all_of(points.begin(), points.end(), [&](const Point3& p) {
     return std::abs(length(p - ball.middle) - ball.radius) < tolerance * ball.radius;
   });
@@ -257,7 +257,7 @@ std::optional<LyingBall> as_ball(const ClosedSurface& closed) {
   return fits && closed.volume > round * whole ? std::optional(ball) : std::nullopt;
 }
 
-TetrahedronMesh lying_ball_mesh(const LyingBall& ball, double unknowns) {
+TetrahedronMesh detected_ball_mesh(const DetectedBall& ball, double unknowns) {
   // The mesh has (4 shells + 1)^3 nodes.
   const int shells = std::max(2, static_cast<int>((std::cbrt(unknowns / 3.0) - 1.0) / 4.0));
   TetrahedronMesh mesh = ball_mesh(ball.radius, shells);
@@ -267,7 +267,7 @@ TetrahedronMesh lying_ball_mesh(const LyingBall& ball, double unknowns) {
   return mesh;
 }
 
-TetrahedronMesh lying_box_mesh(const LyingBox& box, double unknowns) {
+TetrahedronMesh oriented_box_mesh(const OrientedBox& box, double unknowns) {
   const Point3 sides{length(box.sides[0]), length(box.sides[1]), length(box.sides[2])};
   // Nodes are half a cell apart: there are (2 nx + 1)(2 ny + 1)(2 nz + 1).
   const auto cells_of = [&](double cell) {

@@ -46,25 +46,25 @@ TetrahedronMesh box_mesh(const Point3& sides, const std::array<int, 3>& cells);
 TetrahedronMesh ball_mesh(double radius, int shells);
 
 // The box that a surface describes, in any orientation.
-struct LyingBox {
+struct OrientedBox {
   Point3 corner{};
   std::array<Point3, 3> sides{};  // Right-handed.
 };
-std::optional<LyingBox> as_box(const ClosedSurface& closed);
+std::optional<OrientedBox> as_box(const ClosedSurface& closed);
 
 // The ball that a surface describes: all its points lie on one sphere, and its volume is at least
 // nine tenths of the ball's.
-struct LyingBall {
+struct DetectedBall {
   Point3 middle{};
   double radius = 0.0;
 };
-std::optional<LyingBall> as_ball(const ClosedSurface& closed);
+std::optional<DetectedBall> as_ball(const ClosedSurface& closed);
 
 // Meshes this ball with about so many unknowns.
-TetrahedronMesh lying_ball_mesh(const LyingBall& ball, double unknowns);
+TetrahedronMesh detected_ball_mesh(const DetectedBall& ball, double unknowns);
 
 // Meshes this box with about so many unknowns and cells as close to cubes as whole numbers allow.
-TetrahedronMesh lying_box_mesh(const LyingBox& box, double unknowns);
+TetrahedronMesh oriented_box_mesh(const OrientedBox& box, double unknowns);
 
 // Returns the node spacing, in m, that gives a solid of this volume about so many unknowns.
 double edge_length(double volume, double unknowns);

@@ -228,10 +228,10 @@ Result<Meshed> fill_with_tetrahedra(const ClosedSurface& closed, const MeshOrder
                                     const std::function<bool()>& goes_on) {
   if (order.mesher == Mesher::automatic || order.mesher == Mesher::own) {
     if (const auto box = as_box(closed)) {
-      return Meshed{lying_box_mesh(*box, order.unknowns), "ressort, for boxes"};
+      return Meshed{oriented_box_mesh(*box, order.unknowns), "ressort, for boxes"};
     }
     if (const auto ball = as_ball(closed)) {
-      Meshed meshed{lying_ball_mesh(*ball, order.unknowns), "ressort, for balls"};
+      Meshed meshed{detected_ball_mesh(*ball, order.unknowns), "ressort, for balls"};
       restore_volume(meshed.mesh, closed);
       return meshed;
     }

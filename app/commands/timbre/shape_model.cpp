@@ -46,7 +46,7 @@ Result<SoundTargets> liked(const std::string& path, const Progress& progress,
   }
   SoundTargets like{.f0_hz = sound->f0_hz, .rate_hz = sound->rate_hz};
   const FigureValues& values = sound->frames[sound->loudest].values;
-  for (const AskedFigureRow& row : asked_figure_rows()) {
+  for (const TargetFigureRow& row : target_figure_rows()) {
     const std::size_t number = figure_number(row.name);
     if (number < values.size() && values[number]) {
       like.targets.push_back({row.figure, *values[number]});
@@ -54,7 +54,7 @@ Result<SoundTargets> liked(const std::string& path, const Progress& progress,
   }
   if (sound->temporal) {
     like.targets.push_back(
-        {AskedFigure::attack, 1e3 * std::pow(10.0, sound->temporal->log_attack_time)});
+        {TargetFigure::attack, 1e3 * std::pow(10.0, sound->temporal->log_attack_time)});
   }
   const auto found = identify_recording(path, {.most_modes = 40}, progress);
   if (!found) {
@@ -80,7 +80,7 @@ Result<SoundTargets> liked(const std::string& path, const Progress& progress,
     }
   }
   if (pitch != nullptr) {
-    like.targets.push_back({AskedFigure::t60, pitch->t60_s.value});
+    like.targets.push_back({TargetFigure::t60, pitch->t60_s.value});
     like.f0_hz = is_pitch(*pitch) ? pitch->frequency_hz.value : like.f0_hz;
   }
   return like;
@@ -93,7 +93,7 @@ json figure_json(std::optional<double> value) {
 json to_json(const Shaped& shaped, const std::vector<double>& before, double rate_hz,
              const std::string& output) {
   json figures = json::object();
-  for (const AskedFigureRow& row : asked_figure_rows()) {
+  for (const TargetFigureRow& row : target_figure_rows()) {
     const auto index = static_cast<std::size_t>(row.figure);
     json& figure = figures[std::string(row.name)];
     figure = {{"before", figure_json(shaped.found.before[index])},
@@ -112,7 +112,7 @@ json to_json(const Shaped& shaped, const std::vector<double>& before, double rat
     parameters[shaped.names[i]] = {{"before", before[i]}, {"value", shaped.found.values[i]}};
   }
   json held = json::object();
-  for (const AskedTimbre::Held& bound : shaped.found.held) {
+  for (const FoundTimbre::Held& bound : shaped.found.held) {
     held[shaped.names[bound.index]] = bound.is_highest ? "highest" : "lowest";
   }
   return {{"of", shaped.of},
@@ -205,7 +205,7 @@ int shape_model(const ShapeOptions& options, const std::function<bool()>& goes_o
   const Instrument& instrument = compiled->instrument;
   const bool has_keys = scene->has_preset && instrument.mode.has_value();
   std::vector<TimbreTarget> targets = options.targets;
-  const auto is_asked = [&](AskedFigure figure) {
+  const auto is_asked = [&](TargetFigure figure) {
     return std::any_of(targets.begin(), targets.end(),
                        [&](const TimbreTarget& target) { return target.figure == figure; });
   };
@@ -214,8 +214,8 @@ int shape_model(const ShapeOptions& options, const std::function<bool()>& goes_o
       targets.push_back(target);
     }
   }
-  if (like.f0_hz && !has_keys && !is_asked(AskedFigure::f0)) {
-    targets.push_back({AskedFigure::f0, *like.f0_hz});
+  if (like.f0_hz && !has_keys && !is_asked(TargetFigure::f0)) {
+    targets.push_back({TargetFigure::f0, *like.f0_hz});
   }
   std::vector<double> before;
   for (const ParameterInfo& info : instrument.parameters) {

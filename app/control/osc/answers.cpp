@@ -273,7 +273,7 @@ void answer::shape(const Query& query) {
       return;
     }
     for (std::size_t t = 0; t < shaped->targets.size(); ++t) {
-      const AskedFigure figure = shaped->targets[t].figure;
+      const TargetFigure figure = shaped->targets[t].figure;
       reply.text(short_name(figure))
           .real(*shaped->found.reached[static_cast<std::size_t>(figure)])
           .real(shaped->found.noticed[t]);

@@ -270,7 +270,7 @@ class FlightReader {
 
   void read_method(LineWords& words) {
     const std::string_view name = words.word();
-    flight_.setup.method = method_called(name);
+    flight_.setup.method = method_named(name);
     words.ok = flight_.setup.method.has_value();
     advice_ = removed_method_advice(name);
   }

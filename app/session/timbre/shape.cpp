@@ -21,7 +21,7 @@ namespace {
 constexpr double missed_by = 0.1;  // in JND: a smaller deviation counts as reached
 
 // Returns the suffix of a figure's name from its '_' on, or an empty string.
-std::string_view unit_of(AskedFigure figure) {
+std::string_view unit_of(TargetFigure figure) {
   const std::string_view name = row_of(figure).name;
   for (const std::string_view unit : {"_hz", "_ms", "_s"}) {
     if (name.ends_with(unit)) {
@@ -31,7 +31,7 @@ std::string_view unit_of(AskedFigure figure) {
   return {};
 }
 
-std::string told(AskedFigure figure, double value) {
+std::string told(TargetFigure figure, double value) {
   const std::string_view ending = unit_of(figure);
   const std::string unit = ending.empty()    ? ""
                            : ending == "_hz" ? " Hz"
@@ -142,14 +142,14 @@ double key_hz(const Preset& preset, int key) {
 
 }  // namespace
 
-std::string short_name(AskedFigure figure) {
+std::string short_name(TargetFigure figure) {
   const std::string_view name = row_of(figure).name;
   return std::string(name.substr(0, name.size() - unit_of(figure).size()));
 }
 
-Result<AskedFigure> asked_figure(const std::string& word) {
+Result<TargetFigure> parse_target_figure(const std::string& word) {
   std::vector<std::string> known;
-  for (const AskedFigureRow& row : asked_figure_rows()) {
+  for (const TargetFigureRow& row : target_figure_rows()) {
     known.push_back(short_name(row.figure));
     if (word == row.name || word == known.back()) {
       return row.figure;
@@ -174,7 +174,7 @@ Result<Shaped> shape_timbre(const ShapeRequest& request, std::vector<TimbreTarge
     if (std::count_if(targets.begin(), targets.end(), same) > 1) {
       return Error{short_name(targets[i].figure) + " is given twice"};
     }
-    if (request.has_keys && targets[i].figure == AskedFigure::f0) {
+    if (request.has_keys && targets[i].figure == TargetFigure::f0) {
       return Error{"keys set the pitch of " + scene.name + "; use another key instead"};
     }
   }
@@ -195,7 +195,7 @@ Result<Shaped> shape_timbre(const ShapeRequest& request, std::vector<TimbreTarge
                         .pitch_mode = static_cast<std::size_t>(preset.pitch_mode - 1),
                         .has_attack = std::any_of(targets.begin(), targets.end(),
                                                   [](const TimbreTarget& target) {
-                                                    return target.figure == AskedFigure::attack;
+                                                    return target.figure == TargetFigure::attack;
                                                   }),
                         .progress = request.progress};
   shaped.of = scene.name;
@@ -207,17 +207,17 @@ Result<Shaped> shape_timbre(const ShapeRequest& request, std::vector<TimbreTarge
   const Network network = with_fixed(scene.network, preset);
   StruckModel model(network, options);
   shaped.targets = targets;
-  auto found = ask_timbre(asked_model(model, StruckAs::lines), request.values, free, targets,
-                          {.exactly = asked_model(model, StruckAs::samples),
-                           .on_progress = request.on_progress,
-                           .progress = request.progress});
+  auto found = find_timbre(timbre_model(model, StruckAs::lines), request.values, free, targets,
+                           {.exactly = timbre_model(model, StruckAs::samples),
+                            .on_progress = request.on_progress,
+                            .progress = request.progress});
   if (!found) {
     return found.error().message == stopped ? found.error()
                                             : Error{scene.name + ": " + found.error().message};
   }
   shaped.found = *std::move(found);
   if (!options.has_attack) {  // printed even if it is not a target
-    const auto attack = static_cast<std::size_t>(AskedFigure::attack);
+    const auto attack = static_cast<std::size_t>(TargetFigure::attack);
     shaped.found.before[attack] = model.attack_ms(request.values);
     shaped.found.reached[attack] = model.attack_ms(shaped.found.values);
   }
@@ -236,7 +236,7 @@ std::vector<ShapedParameter> changed(const Shaped& shaped, std::span<const doubl
 
 std::vector<std::string> missed(const Shaped& shaped) {
   std::vector<std::string> held;
-  for (const AskedTimbre::Held& bound : shaped.found.held) {
+  for (const FoundTimbre::Held& bound : shaped.found.held) {
     held.push_back(shaped.names[bound.index] + " is at its " +
                    (bound.is_highest ? "highest" : "lowest"));
   }
@@ -251,7 +251,7 @@ std::vector<std::string> missed(const Shaped& shaped) {
     if (std::fabs(noticed) <= missed_by) {
       continue;
     }
-    const AskedFigure figure = shaped.targets[t].figure;
+    const TargetFigure figure = shaped.targets[t].figure;
     const double reached = *shaped.found.reached[static_cast<std::size_t>(figure)];
     const std::string word(noticed < 0.0 ? row_of(figure).more : row_of(figure).less);
     lines.push_back(told(figure, reached) + " is as " + word + " as it gets" +
@@ -262,11 +262,11 @@ std::vector<std::string> missed(const Shaped& shaped) {
 
 std::string to_text(const Shaped& shaped) {
   std::vector<std::vector<std::string>> rows{{"figure", "before", "asked", "reached", "off"}};
-  const auto value = [](AskedFigure figure, const AskedValues& values) {
+  const auto value = [](TargetFigure figure, const TargetValues& values) {
     const auto one = values[static_cast<std::size_t>(figure)];
     return one ? told(figure, *one) : std::string("-");
   };
-  for (const AskedFigureRow& row : asked_figure_rows()) {
+  for (const TargetFigureRow& row : target_figure_rows()) {
     std::vector<std::string> cells{short_name(row.figure), value(row.figure, shaped.found.before),
                                    "", value(row.figure, shaped.found.reached), ""};
     for (std::size_t t = 0; t < shaped.targets.size(); ++t) {

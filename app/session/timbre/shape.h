@@ -15,10 +15,10 @@
 namespace ressort::session {
 
 // Parses "centroid" or "centroid_hz". The error lists all figures.
-Result<AskedFigure> asked_figure(const std::string& word);
+Result<TargetFigure> parse_target_figure(const std::string& word);
 
 // Returns the name without its unit: "centroid".
-std::string short_name(AskedFigure figure);
+std::string short_name(TargetFigure figure);
 
 struct ShapeRequest {
   const Scene& scene;
@@ -32,7 +32,7 @@ struct ShapeRequest {
 };
 
 struct Shaped {
-  AskedTimbre found;
+  FoundTimbre found;
   std::vector<TimbreTarget> targets;
   std::vector<std::string> names;  // [parameter]
   std::string of;                  // description of the sound, for people

@@ -36,7 +36,7 @@ using Place = std::vector<double>;  // [free parameter] 0 to 1.
 
 class MeterReader {
  public:
-  MeterReader(const AskedModel& model, std::span<const double> values,
+  MeterReader(const TimbreModel& model, std::span<const double> values,
               std::span<const FreeParameter> free, std::span<const TimbreTarget> targets,
               const Progress& progress)
       : model_(model),
@@ -47,7 +47,7 @@ class MeterReader {
 
   struct Trial {
     Place place;
-    AskedValues figures;
+    TargetValues figures;
     std::vector<double> noticed;  // [target] In JND.
     double cost() const {
       double sum = 0.0;
@@ -88,7 +88,7 @@ class MeterReader {
     return place;
   }
 
-  Result<AskedValues> figures_before() const { return model_.figures(values_); }
+  Result<TargetValues> figures_before() const { return model_.figures(values_); }
 
   // Stores an error in `error`.
   std::optional<Trial> trial(const Place& place) {
@@ -99,7 +99,7 @@ class MeterReader {
     return model_.near ? trial(place, model_.near(values_at(at), values_at(place))) : trial(place);
   }
 
-  std::optional<Trial> trial(const Place& place, const Result<AskedValues>& found) {
+  std::optional<Trial> trial(const Place& place, const Result<TargetValues>& found) {
     ++trials;
     progress_.spend(std::size_t{1} << 17);  // Counts the cost of one evaluation.
     if (!found) {
@@ -109,7 +109,7 @@ class MeterReader {
     Trial trial{place, *found, {}};
     for (const TimbreTarget& target : targets_) {
       const auto value = (*found)[static_cast<std::size_t>(target.figure)];
-      const double noticed = value ? noticed_between(target.figure, *value, target.value)
+      const double noticed = value ? jnd_between(target.figure, *value, target.value)
                                    : std::numeric_limits<double>::quiet_NaN();
       if (!std::isfinite(noticed)) {
         error = Error{"the sound has no " + std::string(row_of(target.figure).name) + " there"};
@@ -278,7 +278,7 @@ class MeterReader {
     return place == at.place ? std::nullopt : std::optional(place);
   }
 
-  const AskedModel& model_;
+  const TimbreModel& model_;
   std::vector<double> values_;
   std::span<const FreeParameter> free_;
   std::span<const TimbreTarget> targets_;
@@ -291,7 +291,7 @@ double next_share(std::mt19937_64& random) {
 }
 
 std::optional<Error> wrong_target(const TimbreTarget& target) {
-  const std::string_view wrong = wrong_with(target.figure, target.value);
+  const std::string_view wrong = target_error(target.figure, target.value);
   return wrong.empty() ? std::nullopt
                        : std::optional(Error{std::string(row_of(target.figure).name) + " " +
                                              std::string(wrong)});
@@ -301,16 +301,16 @@ std::optional<Error> wrong_target(const TimbreTarget& target) {
 // exact model, which is slower.
 class Search {
  public:
-  Search(const AskedModel& model, std::span<const double> values,
+  Search(const TimbreModel& model, std::span<const double> values,
          std::span<const FreeParameter> free, std::span<const TimbreTarget> targets,
-         const AskOptions& options)
+         const TimbreSearchOptions& options)
       : options_(options),
         free_(free),
         asker_(model, values, free, targets, options.progress),
         judge_(options.exactly ? *options.exactly : model, values, free, targets, options.progress),
         random_(options.seed) {}
 
-  Result<AskedTimbre> run() {
+  Result<FoundTimbre> run() {
     options_.progress.stage("searching for the timbre");
     std::vector<MeterReader::Trial> far;
     int start = 0;
@@ -397,8 +397,8 @@ class Search {
     }
   }
 
-  AskedTimbre told(int starts) {
-    AskedTimbre asked;
+  FoundTimbre told(int starts) {
+    FoundTimbre asked;
     asked.starts = starts;
     // The model may be silent at its current parameters.
     if (const auto before = judge_.figures_before()) {
@@ -421,7 +421,7 @@ class Search {
     return asked;
   }
 
-  const AskOptions& options_;
+  const TimbreSearchOptions& options_;
   std::span<const FreeParameter> free_;
   MeterReader asker_;
   MeterReader judge_;
@@ -433,16 +433,17 @@ class Search {
 
 }  // namespace
 
-AskedModel asked_model(StruckModel& model, StruckAs how) {
+TimbreModel timbre_model(StruckModel& model, StruckAs how) {
   return {[&model, how](std::span<const double> at) { return model.figures(at, how); },
           [&model, how](std::span<const double> place, std::span<const double> at) {
             return model.figures_near(place, at, how);
           }};
 }
 
-Result<AskedTimbre> ask_timbre(const AskedModel& model, std::span<const double> values,
-                               std::span<const FreeParameter> free,
-                               std::span<const TimbreTarget> targets, const AskOptions& options) {
+Result<FoundTimbre> find_timbre(const TimbreModel& model, std::span<const double> values,
+                                std::span<const FreeParameter> free,
+                                std::span<const TimbreTarget> targets,
+                                const TimbreSearchOptions& options) {
   if (free.empty()) {
     return Error{"no parameter is free to change"};
   }

@@ -15,8 +15,8 @@
 namespace ressort::analysis {
 
 struct TimbreTarget {
-  AskedFigure figure = AskedFigure::centroid;
-  double value = 0.0;  // wrong_with() defines the valid values.
+  TargetFigure figure = TargetFigure::centroid;
+  double value = 0.0;  // target_error() defines the valid values.
 };
 
 // A parameter that may change; by equal ratios if its range is wide (is_wide()).
@@ -27,33 +27,33 @@ struct FreeParameter {
 };
 
 // Computes the figures of a model for these parameters, or an error.
-using FiguresAt = std::function<Result<AskedValues>(std::span<const double> parameters)>;
+using FiguresAt = std::function<Result<TargetValues>(std::span<const double> parameters)>;
 
 // Computes the same to first order around `place`.
-using FiguresNear = std::function<Result<AskedValues>(std::span<const double> place,
-                                                      std::span<const double> parameters)>;
+using FiguresNear = std::function<Result<TargetValues>(std::span<const double> place,
+                                                       std::span<const double> parameters)>;
 
-struct AskedModel {
+struct TimbreModel {
   FiguresAt figures;
   FiguresNear near = {};  // Used for slopes; without it `figures` is used.
 };
 
 // Wraps a struck model, which must outlive the result.
-AskedModel asked_model(StruckModel& model, StruckAs how);
+TimbreModel timbre_model(StruckModel& model, StruckAs how);
 
-struct AskOptions {
+struct TimbreSearchOptions {
   int starts = 8;  // The first start is the current parameters, the others are random.
-  std::optional<AskedModel> exactly;            // Refines and judges the best result, if given.
+  std::optional<TimbreModel> exactly;           // Refines and judges the best result, if given.
   std::uint64_t seed = 1;                       // Seed of the random starts.
   std::function<void(double share)> on_progress =
       {};  // Reports progress from 0 to 1 as starts finish.
   Progress progress = {};
 };
 
-struct AskedTimbre {
+struct FoundTimbre {
   std::vector<double> values;  // [parameter]
-  AskedValues before;          // Figures at the original parameters.
-  AskedValues reached;
+  TargetValues before;         // Figures at the original parameters.
+  TargetValues reached;
   std::vector<double> noticed;  // [target] Error in JND; above 0: more than the target.
   // Free parameters held by a bound although a value beyond it would be nearer to the target.
   struct Held {
@@ -72,8 +72,9 @@ struct AskedTimbre {
 // `exactly`. `values` are the current parameters. Fails if nothing is free, a target is invalid,
 // the model lacks a figure at its current parameters, or the search is stopped (`stopped`).
 // O(starts * steps * parameters) evaluations.
-Result<AskedTimbre> ask_timbre(const AskedModel& model, std::span<const double> values,
-                               std::span<const FreeParameter> free,
-                               std::span<const TimbreTarget> targets, const AskOptions& options);
+Result<FoundTimbre> find_timbre(const TimbreModel& model, std::span<const double> values,
+                                std::span<const FreeParameter> free,
+                                std::span<const TimbreTarget> targets,
+                                const TimbreSearchOptions& options);
 
 }  // namespace ressort::analysis

@@ -22,19 +22,19 @@ constexpr int most_tunings = 12;
 constexpr double longest_attack_s = 3.0;  // Later peaks are ignored.
 constexpr std::size_t coarse_step = 8;    // Samples.
 
-constexpr AskedFigureRow figure_rows[] = {
-    {AskedFigure::f0, "f0_hz", 0.0028922, true, "high", "low"},  // 5 cents
-    {AskedFigure::t60, "t60_s", 0.05, true, "long", "short"},
-    {AskedFigure::centroid, "centroid_hz", 0.03, true, "bright", "dark"},
-    {AskedFigure::spread, "spread_hz", 0.05, true, "wide", "narrow"},
-    {AskedFigure::inharmonicity, "inharmonicity", 1e-3, false, "bell-like", "harmonic"},
-    {AskedFigure::odd_to_even, "odd_to_even", 0.2589254, true, "hollow", "full"},  // 1 dB
-    {AskedFigure::rolloff, "rolloff95_hz", 0.05, true, "high in rolloff", "low in rolloff"},
-    {AskedFigure::skewness, "skewness", 0.1, false, "skewed", "little skewed", true},
-    {AskedFigure::kurtosis, "kurtosis", 0.05, true, "peaked", "flat"},
+constexpr TargetFigureRow figure_rows[] = {
+    {TargetFigure::f0, "f0_hz", 0.0028922, true, "high", "low"},  // 5 cents
+    {TargetFigure::t60, "t60_s", 0.05, true, "long", "short"},
+    {TargetFigure::centroid, "centroid_hz", 0.03, true, "bright", "dark"},
+    {TargetFigure::spread, "spread_hz", 0.05, true, "wide", "narrow"},
+    {TargetFigure::inharmonicity, "inharmonicity", 1e-3, false, "bell-like", "harmonic"},
+    {TargetFigure::odd_to_even, "odd_to_even", 0.2589254, true, "hollow", "full"},  // 1 dB
+    {TargetFigure::rolloff, "rolloff95_hz", 0.05, true, "high in rolloff", "low in rolloff"},
+    {TargetFigure::skewness, "skewness", 0.1, false, "skewed", "little skewed", true},
+    {TargetFigure::kurtosis, "kurtosis", 0.05, true, "peaked", "flat"},
     // Equals a change of 3 % in a centroid of 1400 Hz.
-    {AskedFigure::slope, "slope", 1e-9, false, "little sloped", "steeply sloped", true},
-    {AskedFigure::attack, "attack_ms", 0.2589254, true, "slow", "sudden"},  // 0.1 of its log10.
+    {TargetFigure::slope, "slope", 1e-9, false, "little sloped", "steeply sloped", true},
+    {TargetFigure::attack, "attack_ms", 0.2589254, true, "slow", "sudden"},  // 0.1 of its log10.
 };
 
 // Returns the stiffness k/m, in samples, of a mode of the published scheme from its pole.
@@ -96,16 +96,16 @@ double slope_of_bins(double centroid_hz, double rate_hz, std::size_t frame) {
 
 }  // namespace
 
-std::span<const AskedFigureRow> asked_figure_rows() {
+std::span<const TargetFigureRow> target_figure_rows() {
   return figure_rows;
 }
 
-const AskedFigureRow& row_of(AskedFigure figure) {
+const TargetFigureRow& row_of(TargetFigure figure) {
   return figure_rows[static_cast<std::size_t>(figure)];
 }
 
-std::string_view wrong_with(AskedFigure figure, double value) {
-  const AskedFigureRow& row = row_of(figure);
+std::string_view target_error(TargetFigure figure, double value) {
+  const TargetFigureRow& row = row_of(figure);
   const bool is_right =
       std::isfinite(value) && (row.is_signed || value > 0.0 || (value == 0.0 && !row.is_ratio));
   return is_right        ? ""
@@ -114,8 +114,8 @@ std::string_view wrong_with(AskedFigure figure, double value) {
                          : "must be a number of at least 0";
 }
 
-double noticed_between(AskedFigure figure, double value, double target) {
-  const AskedFigureRow& row = row_of(figure);
+double jnd_between(TargetFigure figure, double value, double target) {
+  const TargetFigureRow& row = row_of(figure);
   return row.is_ratio ? std::log(value / target) / std::log1p(row.noticed)
                       : (value - target) / row.noticed;
 }
@@ -324,18 +324,18 @@ std::optional<double> StruckModel::attack_of(const Tuned& tuned, StruckAs how) c
                                          : shape->smooth_attack_s);
 }
 
-Result<AskedValues> StruckModel::figures(std::span<const double> parameters, StruckAs how) {
+Result<TargetValues> StruckModel::figures(std::span<const double> parameters, StruckAs how) {
   const auto found = tuned(parameters, {});
   return found ? figures_of(*found, how) : found.error();
 }
 
-Result<AskedValues> StruckModel::figures_near(std::span<const double> place,
-                                              std::span<const double> parameters, StruckAs how) {
+Result<TargetValues> StruckModel::figures_near(std::span<const double> place,
+                                               std::span<const double> parameters, StruckAs how) {
   const auto found = tuned(parameters, place);
   return found ? figures_of(*found, how) : found.error();
 }
 
-Result<AskedValues> StruckModel::figures_of(const Tuned& tuned, StruckAs how) const {
+Result<TargetValues> StruckModel::figures_of(const Tuned& tuned, StruckAs how) const {
   std::vector<DecayingPartial> partials;
   double loudest = 0.0;
   for (const HeardMode& mode : tuned.modes) {
@@ -365,8 +365,8 @@ Result<AskedValues> StruckModel::figures_of(const Tuned& tuned, StruckAs how) co
       [&](const DecayingPartial& partial) { return partial.residue > least_residue * loudest; });
   const std::size_t pitch =
       options_.key_hz ? options_.pitch_mode : static_cast<std::size_t>(heard - partials.begin());
-  AskedValues values;
-  const auto set = [&](AskedFigure figure, std::optional<double> value) {
+  TargetValues values;
+  const auto set = [&](TargetFigure figure, std::optional<double> value) {
     const bool is_there =
         value && std::isfinite(*value) && (*value > 0.0 || !row_of(figure).is_ratio);
     values[static_cast<std::size_t>(figure)] = is_there ? value : std::nullopt;
@@ -375,24 +375,24 @@ Result<AskedValues> StruckModel::figures_of(const Tuned& tuned, StruckAs how) co
     return Error{"no oscillating mode is left that could be the pitch"};
   }
   const auto& [f0_hz, t60_s] = tuned.modes[pitch].tone;
-  set(AskedFigure::f0, f0_hz);
-  set(AskedFigure::t60, std::min(t60_s, longest_t60_s));
+  set(TargetFigure::f0, f0_hz);
+  set(TargetFigure::t60, std::min(t60_s, longest_t60_s));
   const FrameTimbre timbre =
       how == StruckAs::samples ? analysed(tuned, f0_hz) : lines_of(partials, f0_hz);
   if (timbre.shape) {
-    set(AskedFigure::centroid, timbre.shape->centroid_hz);
-    set(AskedFigure::spread, timbre.shape->spread_hz);
-    set(AskedFigure::rolloff, timbre.shape->rolloff95_hz);
-    set(AskedFigure::skewness, timbre.shape->skewness);
-    set(AskedFigure::kurtosis, timbre.shape->kurtosis);
-    set(AskedFigure::slope, timbre.shape->slope);
+    set(TargetFigure::centroid, timbre.shape->centroid_hz);
+    set(TargetFigure::spread, timbre.shape->spread_hz);
+    set(TargetFigure::rolloff, timbre.shape->rolloff95_hz);
+    set(TargetFigure::skewness, timbre.shape->skewness);
+    set(TargetFigure::kurtosis, timbre.shape->kurtosis);
+    set(TargetFigure::slope, timbre.shape->slope);
   }
   if (timbre.harmonics) {
-    set(AskedFigure::inharmonicity, timbre.harmonics->inharmonicity);
-    set(AskedFigure::odd_to_even, timbre.harmonics->odd_to_even);
+    set(TargetFigure::inharmonicity, timbre.harmonics->inharmonicity);
+    set(TargetFigure::odd_to_even, timbre.harmonics->odd_to_even);
   }
   if (options_.has_attack) {
-    set(AskedFigure::attack, attack_of(tuned, how));
+    set(TargetFigure::attack, attack_of(tuned, how));
   }
   return values;
 }

@@ -23,7 +23,7 @@ namespace ressort::analysis {
 
 // Figures that can be targets. Other figures are discontinuous in the parameters, or depend on the
 // number of bins.
-enum class AskedFigure : std::uint8_t {
+enum class TargetFigure : std::uint8_t {
   f0,
   t60,
   centroid,
@@ -36,10 +36,10 @@ enum class AskedFigure : std::uint8_t {
   slope,
   attack
 };
-inline constexpr std::size_t asked_figures = 11;
+inline constexpr std::size_t target_figure_count = 11;
 
-struct AskedFigureRow {
-  AskedFigure figure = AskedFigure::f0;
+struct TargetFigureRow {
+  TargetFigure figure = TargetFigure::f0;
   std::string_view name;  // Name with its unit, as in descriptions.
   // Just noticeable difference: relative, or absolute if `is_ratio` is false.
   double noticed = 0.0;
@@ -50,16 +50,16 @@ struct AskedFigureRow {
   bool is_signed = false;
 };
 // Returns what is wrong with a target value, such as "must be a number above 0"; empty if valid.
-std::string_view wrong_with(AskedFigure figure, double value);
-const AskedFigureRow& row_of(AskedFigure figure);
-std::span<const AskedFigureRow> asked_figure_rows();
+std::string_view target_error(TargetFigure figure, double value);
+const TargetFigureRow& row_of(TargetFigure figure);
+std::span<const TargetFigureRow> target_figure_rows();
 
 // [figure] Absent if the sound does not have it.
-using AskedValues = std::array<std::optional<double>, asked_figures>;
+using TargetValues = std::array<std::optional<double>, target_figure_count>;
 
 // Returns the difference of a figure from its target in JND; above 0 if it is more. Both must be
 // above 0 if the figure is a ratio.
-double noticed_between(AskedFigure figure, double value, double target);
+double jnd_between(TargetFigure figure, double value, double target);
 
 // A pulse of force, or of displacement if the input is a position: one sample, or a raised cosine
 // of the same sum.
@@ -99,12 +99,12 @@ class StruckModel {
   // the reason if there are none: no mode oscillates or is heard, a mode grows, a value is not
   // finite, the model is not linear, or `stopped`. O(masses^3), and O(masses^2) if the last
   // parameters had modes of the same shapes.
-  Result<AskedValues> figures(std::span<const double> parameters, StruckAs how);
+  Result<TargetValues> figures(std::span<const double> parameters, StruckAs how);
 
   // Returns the same to first order around `place`, for slopes. The first call for a place takes
   // O(masses^3), later ones O(masses^2) unless the change splits degenerate modes.
-  Result<AskedValues> figures_near(std::span<const double> place,
-                                   std::span<const double> parameters, StruckAs how);
+  Result<TargetValues> figures_near(std::span<const double> place,
+                                    std::span<const double> parameters, StruckAs how);
 
   // Returns the attack of figures() by samples, whether or not `has_attack` is set; empty if there
   // are no figures.
@@ -126,7 +126,7 @@ class StruckModel {
                                              const ModeOptions& how);
   ModeOptions mode_options(double factor) const;
   std::vector<std::size_t> pushed() const;
-  Result<AskedValues> figures_of(const Tuned& tuned, StruckAs how) const;
+  Result<TargetValues> figures_of(const Tuned& tuned, StruckAs how) const;
   FrameTimbre lines_of(std::span<const DecayingPartial> partials, double f0_hz) const;
   ModalSound sound_of(const Tuned& tuned) const;
   FrameTimbre analysed(const Tuned& tuned, double f0_hz) const;

@@ -90,37 +90,37 @@ std::optional<double> attack_ms(std::span<const double> samples) {
 
 // The descriptors of that sound. Its first 46 ms do not determine f0 and T60, so those are taken
 // from the modes.
-AskedValues heard(const Played& model, std::span<const double> parameters) {
+TargetValues heard(const Played& model, std::span<const double> parameters) {
   const Network network = read(model);
   const auto told = StruckModel(network, {}).figures(parameters, StruckAs::lines);
   REQUIRE(told);
-  AskedValues values = *told;
+  TargetValues values = *told;
   FrameAnalysis analysis({.rate_hz = rate_hz,
                           .size = frame,
-                          .f0_hz = values[static_cast<std::size_t>(AskedFigure::f0)]});
+                          .f0_hz = values[static_cast<std::size_t>(TargetFigure::f0)]});
   const std::vector<double> sound = rendered(network, parameters, sound_samples);
   const FrameTimbre timbre = analysis.next(std::span(sound).first(frame));
-  const auto set = [&](AskedFigure figure, std::optional<double> value) {
+  const auto set = [&](TargetFigure figure, std::optional<double> value) {
     values[static_cast<std::size_t>(figure)] = value;
   };
-  set(AskedFigure::centroid, timbre.shape->centroid_hz);
-  set(AskedFigure::spread, timbre.shape->spread_hz);
-  set(AskedFigure::rolloff, timbre.shape->rolloff95_hz);
-  set(AskedFigure::skewness, timbre.shape->skewness);
-  set(AskedFigure::kurtosis, timbre.shape->kurtosis);
-  set(AskedFigure::slope, timbre.shape->slope);
-  set(AskedFigure::inharmonicity, timbre.harmonics->inharmonicity);
-  set(AskedFigure::odd_to_even, timbre.harmonics->odd_to_even);
-  set(AskedFigure::attack, attack_ms(sound));
+  set(TargetFigure::centroid, timbre.shape->centroid_hz);
+  set(TargetFigure::spread, timbre.shape->spread_hz);
+  set(TargetFigure::rolloff, timbre.shape->rolloff95_hz);
+  set(TargetFigure::skewness, timbre.shape->skewness);
+  set(TargetFigure::kurtosis, timbre.shape->kurtosis);
+  set(TargetFigure::slope, timbre.shape->slope);
+  set(TargetFigure::inharmonicity, timbre.harmonics->inharmonicity);
+  set(TargetFigure::odd_to_even, timbre.harmonics->odd_to_even);
+  set(TargetFigure::attack, attack_ms(sound));
   return values;
 }
 
-Result<AskedTimbre> asked(const Played& model, std::span<const double> start,
+Result<FoundTimbre> asked(const Played& model, std::span<const double> start,
                           std::span<const TimbreTarget> targets) {
   const Network network = read(model);
   StruckModel struck(network, {.has_attack = true});
-  return ask_timbre(asked_model(struck, StruckAs::lines), start, free_of(model), targets,
-                    {.exactly = asked_model(struck, StruckAs::samples)});
+  return find_timbre(timbre_model(struck, StruckAs::lines), start, free_of(model), targets,
+                     {.exactly = timbre_model(struck, StruckAs::samples)});
 }
 
 }  // namespace
@@ -136,8 +136,8 @@ TEST_CASE("figures computed from samples equal those of the sound", "[ask]") {
     const auto told =
         StruckModel(read(model), {.has_attack = true}).figures(parameters, StruckAs::samples);
     REQUIRE(told);
-    const AskedValues sound = heard(model, parameters);
-    for (const AskedFigureRow& row : asked_figure_rows()) {
+    const TargetValues sound = heard(model, parameters);
+    for (const TargetFigureRow& row : target_figure_rows()) {
       INFO(row.name);
       const auto index = static_cast<std::size_t>(row.figure);
       REQUIRE((*told)[index].has_value() == sound[index].has_value());
@@ -161,9 +161,9 @@ TEST_CASE("the timbre of hidden parameters is always found", "[ask]") {
       hidden.push_back(drawn(random, range));
       start.push_back(drawn(random, range));
     }
-    const AskedValues wanted = heard(model, hidden);
+    const TargetValues wanted = heard(model, hidden);
     std::vector<TimbreTarget> targets;
-    for (const AskedFigureRow& row : asked_figure_rows()) {
+    for (const TargetFigureRow& row : target_figure_rows()) {
       if (const auto value = wanted[static_cast<std::size_t>(row.figure)]) {
         targets.push_back({row.figure, *value});
       }
@@ -172,12 +172,12 @@ TEST_CASE("the timbre of hidden parameters is always found", "[ask]") {
     const auto asked_for = asked(model, start, targets);
     const double took_s = static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC;
     REQUIRE(asked_for);
-    const AskedValues sound = heard(model, asked_for->values);
+    const TargetValues sound = heard(model, asked_for->values);
     double off = 0.0;
     for (const TimbreTarget& target : targets) {
       const auto value = sound[static_cast<std::size_t>(target.figure)];
       REQUIRE(value);
-      off = std::max(off, std::fabs(noticed_between(target.figure, *value, target.value)));
+      off = std::max(off, std::fabs(jnd_between(target.figure, *value, target.value)));
     }
     found += off <= 0.1 ? 1 : 0;
     worst = std::max(worst, off);
@@ -198,7 +198,7 @@ const Played beating{
     {{0.001, 0.004}, {0.000005, 0.0002}, {0.0001, 0.002}}};
 
 TEST_CASE("a requested attack is reached in the sound", "[ask]") {
-  const auto index = static_cast<std::size_t>(AskedFigure::attack);
+  const auto index = static_cast<std::size_t>(TargetFigure::attack);
   support::Random random(15);
   for (int round = 0; round < 5; ++round) {
     std::vector<double> hidden;
@@ -208,16 +208,16 @@ TEST_CASE("a requested attack is reached in the sound", "[ask]") {
       start.push_back(drawn(random, range));
     }
     const double wanted_ms = *heard(beating, hidden)[index];
-    const TimbreTarget targets[] = {{AskedFigure::attack, wanted_ms}};
+    const TimbreTarget targets[] = {{TargetFigure::attack, wanted_ms}};
     const auto found = asked(beating, start, targets);
     REQUIRE(found);
     CHECK(found->is_reached);
     const double reached_ms = *heard(beating, found->values)[index];
     INFO(wanted_ms << " ms, " << reached_ms << " ms");
-    CHECK(std::fabs(noticed_between(AskedFigure::attack, reached_ms, wanted_ms)) < 0.1);
+    CHECK(std::fabs(jnd_between(TargetFigure::attack, reached_ms, wanted_ms)) < 0.1);
   }
   // The slowest attack has the weakest spring between them and the least loss.
-  const TimbreTarget slow[] = {{AskedFigure::attack, 10000.0}};
+  const TimbreTarget slow[] = {{TargetFigure::attack, 10000.0}};
   const auto slowest = asked(beating, std::vector<double>{0.002, 0.00002, 0.0005}, slow);
   REQUIRE(slowest);
   CHECK_FALSE(slowest->is_reached);
@@ -233,12 +233,12 @@ TEST_CASE("unreachable targets are reported with the bound that limits them", "[
   // f = rate / pi asin(sqrt(K/M) sin(pi / 2 / (N + 1))), by hand: 40 masses, of which 38 move.
   const double highest_hz =
       rate_hz / std::numbers::pi * std::asin(std::sqrt(0.9) * std::sin(std::numbers::pi / 78.0));
-  const TimbreTarget high[] = {{AskedFigure::f0, 5000.0}};
+  const TimbreTarget high[] = {{TargetFigure::f0, 5000.0}};
   const auto top = asked(model, start, high);
   REQUIRE(top);
   CHECK_FALSE(top->is_reached);
   CHECK(top->values[0] == 0.9);
-  CHECK(*top->reached[static_cast<std::size_t>(AskedFigure::f0)] ==
+  CHECK(*top->reached[static_cast<std::size_t>(TargetFigure::f0)] ==
         Approx(highest_hz).epsilon(1e-4));  // Z shifts the frequency a little.
   REQUIRE_FALSE(top->held.empty());
   CHECK(top->held[0].index == 0);
@@ -248,11 +248,11 @@ TEST_CASE("unreachable targets are reported with the bound that limits them", "[
   // T60 = 13.8155 / (rate zeta), zeta = Z/M (2 sin(pi / 2 / (N + 1)))^2: the longest has Z at its
   // lowest, for any K.
   const double zeta = 1e-4 * std::pow(2.0 * std::sin(std::numbers::pi / 78.0), 2.0);
-  const TimbreTarget long_one[] = {{AskedFigure::t60, 1e300}};
+  const TimbreTarget long_one[] = {{TargetFigure::t60, 1e300}};
   const auto longest = asked(model, start, long_one);
   REQUIRE(longest);
   CHECK(longest->values[1] == 1e-4);
-  CHECK(*longest->reached[static_cast<std::size_t>(AskedFigure::t60)] ==
+  CHECK(*longest->reached[static_cast<std::size_t>(TargetFigure::t60)] ==
         Approx(-3.0 * std::log(10.0) / (rate_hz * 0.5 * std::log1p(-zeta))).epsilon(1e-6));
 }
 
@@ -261,7 +261,7 @@ TEST_CASE("invalid figures and models without free parameters are rejected", "[a
   const std::vector<double> start{0.2, 0.001, 0.3};
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   constexpr double endless = std::numeric_limits<double>::infinity();
-  for (const AskedFigureRow& row : asked_figure_rows()) {
+  for (const TargetFigureRow& row : target_figure_rows()) {
     INFO(row.name);
     for (const double wrong : {-1.0, nan, endless, -endless}) {
       if (wrong == -1.0 && row.is_signed) {
@@ -281,23 +281,24 @@ TEST_CASE("invalid figures and models without free parameters are rejected", "[a
       }
     }
   }
-  const TimbreTarget zero[] = {{AskedFigure::centroid, 0.0}};
+  const TimbreTarget zero[] = {{TargetFigure::centroid, 0.0}};
   CHECK_FALSE(asked(model, start, zero));
-  const TimbreTarget harmonic[] = {{AskedFigure::inharmonicity, 0.0}};
+  const TimbreTarget harmonic[] = {{TargetFigure::inharmonicity, 0.0}};
   CHECK(asked(model, start, harmonic));
-  const FiguresAt any = [](std::span<const double>) { return AskedValues{1.0, 1.0, 1.0}; };
-  const TimbreTarget bright[] = {{AskedFigure::centroid, 2.0}};
-  CHECK(ask_timbre({any}, start, {}, bright, {}).error().message ==
+  const FiguresAt any = [](std::span<const double>) { return TargetValues{1.0, 1.0, 1.0}; };
+  const TimbreTarget bright[] = {{TargetFigure::centroid, 2.0}};
+  CHECK(find_timbre({any}, start, {}, bright, {}).error().message ==
         "no parameter is free to change");
   const FreeParameter one[] = {{0, 0.1, 0.3}};
-  CHECK(ask_timbre({any}, start, one, {}, {}).error().message == "no target is given");
+  CHECK(find_timbre({any}, start, one, {}, {}).error().message == "no target is given");
   // A parameter without influence keeps its value, and the result says so.
-  const auto idle = ask_timbre({any}, start, one, bright, {});
+  const auto idle = find_timbre({any}, start, one, bright, {});
   REQUIRE(idle);
   CHECK_FALSE(idle->has_influence);
   CHECK(idle->values == start);
-  const TimbreTarget hollow[] = {{AskedFigure::odd_to_even, 2.0}};
-  CHECK(ask_timbre({any}, start, one, hollow, {}).error().message == "the sound has no odd_to_even there");
+  const TimbreTarget hollow[] = {{TargetFigure::odd_to_even, 2.0}};
+  CHECK(find_timbre({any}, start, one, hollow, {}).error().message ==
+        "the sound has no odd_to_even there");
 }
 
 TEST_CASE("a search handles silence, unstable corners and cancellation", "[ask]") {
@@ -306,7 +307,7 @@ TEST_CASE("a search handles silence, unstable corners and cancellation", "[ask]"
       "@k param 0.1\n@g ground 0.\n@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n"
       "@s spring @g @a k\n@in1 frcInput @a\n@out1 posOutput @b\n",
       {{0.01, 0.5}}};
-  const TimbreTarget bright[] = {{AskedFigure::centroid, 500.0}};
+  const TimbreTarget bright[] = {{TargetFigure::centroid, 500.0}};
   const auto nothing = asked(silent, std::vector<double>{0.1}, bright);
   REQUIRE_FALSE(nothing);
   CHECK(nothing.error().message.find("the output is silent") != std::string::npos);
@@ -316,7 +317,7 @@ TEST_CASE("a search handles silence, unstable corners and cancellation", "[ask]"
       "@k param 0.1\n@z param 0.001\n@g ground 0.\n@a mass 1. 0. 0.\n"
       "@s springDamper @g @a k z\n@in1 frcInput @a\n@out1 posOutput @a\n",
       {{0.001, 40.0}, {-0.01, 0.01}}};
-  const TimbreTarget tone[] = {{AskedFigure::f0, 3000.0}, {AskedFigure::t60, 0.5}};
+  const TimbreTarget tone[] = {{TargetFigure::f0, 3000.0}, {TargetFigure::t60, 0.5}};
   const auto found = asked(corner, std::vector<double>{20.0, -0.005}, tone);
   REQUIRE(found);
   CHECK(found->is_reached);
@@ -326,11 +327,11 @@ TEST_CASE("a search handles silence, unstable corners and cancellation", "[ask]"
   CHECK(found->values[1] == Approx(1.0 - r * r).epsilon(1e-3));
   CHECK(found->values[0] == Approx(1.0 + r * r - 2.0 * r * std::cos(theta)).epsilon(1e-3));
 
-  const FiguresAt any = [](std::span<const double>) { return AskedValues{1.0, 1.0, 1.0}; };
+  const FiguresAt any = [](std::span<const double>) { return TargetValues{1.0, 1.0, 1.0}; };
   const FreeParameter one[] = {{0, 0.1, 0.3}};
   const auto stopped_one =
-      ask_timbre({any}, std::vector<double>{0.2}, one, bright,
-                 {.progress = Progress([](std::string_view) { return false; })});
+      find_timbre({any}, std::vector<double>{0.2}, one, bright,
+                  {.progress = Progress([](std::string_view) { return false; })});
   REQUIRE_FALSE(stopped_one);
   CHECK(stopped_one.error().message == stopped);
 }
@@ -339,12 +340,12 @@ TEST_CASE("a key's pitch stays constant while the timbre changes", "[ask]") {
   const Network network = read(models[1]);
   const FreeParameter free[] = {{0, 0.05, 0.5}, {1, 1e-3, 0.1}, {2, 1e-4, 0.01}};
   StruckModel keyed(network, {.key_hz = 220.0});
-  const TimbreTarget targets[] = {{AskedFigure::inharmonicity, 0.01}, {AskedFigure::t60, 3.0}};
-  const auto found = ask_timbre(asked_model(keyed, StruckAs::lines),
-                                std::vector<double>{0.2, 0.02, 0.001}, free, targets, {});
+  const TimbreTarget targets[] = {{TargetFigure::inharmonicity, 0.01}, {TargetFigure::t60, 3.0}};
+  const auto found = find_timbre(timbre_model(keyed, StruckAs::lines),
+                                 std::vector<double>{0.2, 0.02, 0.001}, free, targets, {});
   REQUIRE(found);
   const double cents =
-      1200.0 * std::log2(*found->reached[static_cast<std::size_t>(AskedFigure::f0)] / 220.0);
+      1200.0 * std::log2(*found->reached[static_cast<std::size_t>(TargetFigure::f0)] / 220.0);
   CHECK(std::fabs(cents) < 1e-5);
 }
 
@@ -355,7 +356,7 @@ TEST_CASE("a key scales springs at places of a string", "[ask]") {
   StruckModel model(network, {.key_hz = 220.0});
   const auto told = model.figures(parameter_values(network), StruckAs::lines);
   REQUIRE(told);
-  CHECK(*(*told)[static_cast<std::size_t>(AskedFigure::f0)] == Approx(220.0).epsilon(1e-8));
+  CHECK(*(*told)[static_cast<std::size_t>(TargetFigure::f0)] == Approx(220.0).epsilon(1e-8));
 }
 
 // A raised cosine of 2 ms is a low-pass filter; the output is the mean of two channels.
@@ -379,7 +380,7 @@ TEST_CASE("a longer strike is darker, like the sound of the same pulse", "[ask]"
     const auto values_there =
         StruckModel(network, {.blows = {{.length_s = length_s}}}).figures(values, how);
     REQUIRE(values_there);
-    return *(*values_there)[static_cast<std::size_t>(AskedFigure::centroid)];
+    return *(*values_there)[static_cast<std::size_t>(TargetFigure::centroid)];
   };
   CHECK(told(length / rate_hz, StruckAs::samples) == Approx(sound.centroid_hz).epsilon(1e-6));
   CHECK(told(length / rate_hz, StruckAs::lines) == Approx(sound.centroid_hz).epsilon(0.05));

@@ -61,7 +61,7 @@ TEST_CASE("a box is recognised in any orientation, and nothing else is", "[solid
     REQUIRE(closed);
     const auto found = as_box(*closed);
     REQUIRE(found);
-    const auto mesh = quadratic(lying_box_mesh(*found, 3000.0));
+    const auto mesh = quadratic(oriented_box_mesh(*found, 3000.0));
     REQUIRE(mesh);
     CHECK(volume_of(*mesh) == Approx(closed->volume).epsilon(1e-9));
     CHECK(mesh->unknowns() < 3300);
@@ -108,7 +108,7 @@ TEST_CASE("a ball is recognised anywhere, and nothing else is", "[solid_mesh]") 
   REQUIRE(found);
   CHECK(found->radius == Approx(0.7).epsilon(1e-9));
   CHECK(length(found->middle - Point3{10.0, -3.0, 2.0}) < 1e-9);
-  const auto mesh = quadratic(lying_ball_mesh(*found, 10000.0));
+  const auto mesh = quadratic(detected_ball_mesh(*found, 10000.0));
   REQUIRE(mesh);
   CHECK(mesh->unknowns() < 10000);
   // One point moved; a truncated ball; an elongated one; and a box, whose corners also lie on a

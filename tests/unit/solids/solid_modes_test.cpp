@@ -190,7 +190,7 @@ TEST_CASE("boxes of any size and material have the frequencies of Ritz's method"
     const SolidMaterial material{"", random.uniform(1e9, 3e11), random.uniform(0.0, 0.4),
                                  random.uniform(500.0, 10000.0)};
     const std::vector<double> exact = ritz_box(sides, material, 9);
-    const TetrahedronMesh mesh = lying_box_mesh(
+    const TetrahedronMesh mesh = oriented_box_mesh(
         {{}, {Point3{sides[0], 0.0, 0.0}, Point3{0.0, sides[1], 0.0}, Point3{0.0, 0.0, sides[2]}}},
         6000.0);
     const SolidModes modes = modes_of(mesh, material, 8);
