@@ -293,8 +293,8 @@ with {
                   scenes::on_a_waveguide(felt_line + "[@s 0.4] @in2 0.03 1.5 0.02 0.05"))}) {
     const auto text = model::faust_text(support::network_of(model), {.name = name, .laws = table});
     REQUIRE(text);
-    CHECK(text->find("felt(0.03*r*r, 1.5, 0.02*r, 0.05") != std::string::npos ||
-          text->find(" : alone_felt") != std::string::npos);
+    CHECK((text->find("felt(0.03*r*r, 1.5, 0.02*r, 0.05") != std::string::npos ||
+           text->find(" : alone_felt") != std::string::npos));
     CHECK(text->find("power_contact") == std::string::npos);
     const std::string path = (folder / name).string();
     write(path + ".dsp", *text);

@@ -53,7 +53,7 @@ double solving_operations(const Program& program, double packs, double places) {
   double sum = 0.0;
   for (const LinkRun& run : program.link_runs) {
     const LawFacts& law = facts_of(run.law);
-    const double each = links == 1.0             ? 1.5 * law.solve_operations
+    const double each = links == 1.0             ? std::min(1.5 * law.solve_operations, of_a_link)
                         : law.is_straight        ? of_a_straight_link
                         : law.zone == Zone::near ? 0.5 * of_a_link
                                                  : of_a_link;
