@@ -48,7 +48,7 @@ std::shared_ptr<const Picture> MotionFeed::picture() const {
   return found != pictures_.end() ? found->second : nullptr;
 }
 
-std::shared_ptr<const MotionFeed::Frame> MotionFeed::look(bool is_slow) {
+std::shared_ptr<const MotionFeed::Frame> MotionFeed::newest_frame(bool is_slow) {
   const std::lock_guard lock(mutex_);
   if (process_.motion.take()) {
     const MotionFrame& frame = process_.motion.reading();

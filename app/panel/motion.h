@@ -34,7 +34,7 @@ class MotionFeed {
     std::string bytes;
   };
   // `is_slow`: stroboscopic slow motion, shared by all viewers.
-  std::shared_ptr<const Frame> look(bool is_slow = false);
+  std::shared_ptr<const Frame> newest_frame(bool is_slow = false);
 
  private:
   std::string pack(const MotionFrame& frame);

@@ -292,7 +292,7 @@ struct WebPanel::Server {
   // Returns the current picture; before the first viewer, requests a frame to get it.
   std::shared_ptr<const Picture> picture() {
     for (int looks = 0; looks < 20; ++looks) {
-      motion.look();
+      motion.newest_frame();
       if (auto found = motion.picture()) {
         return found;
       }
@@ -370,7 +370,7 @@ struct WebPanel::Server {
         octets,
         [this, hz, is_slow, seat, last = std::uint64_t{0}, next = std::chrono::steady_clock::now()](
             std::size_t, httplib::DataSink& sink) mutable {
-          const auto frame = motion.look(is_slow);
+          const auto frame = motion.newest_frame(is_slow);
           if (frame->frame != last && !frame->bytes.empty()) {
             last = frame->frame;
             if (!sink.write(frame->bytes.data(), frame->bytes.size())) {

@@ -312,7 +312,7 @@ class NetworkJsonWriter {
   json line_of(const Link& link, std::uint32_t a, std::uint32_t b) const {
     const LawFacts& facts = facts_of(link.law);
     json line = {a, b, static_cast<int>(link.law)};
-    if (facts.lets_go()) {
+    if (facts.can_detach()) {
       line.push_back(facts.zone == Zone::below ? 1 : 2);
       line.push_back(
           argument_value(network_, link.arguments[facts.slot(Role::reach)], parameters_));

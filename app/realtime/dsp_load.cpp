@@ -39,7 +39,7 @@ void DspLoad::add(double took_s, double sound_s) {
   took_s_ = sound_s_ = 0.0;
 }
 
-std::optional<int> DspLoad::judge(int sounding, int all) {
+std::optional<int> DspLoad::update_limit(int sounding, int all) {
   if (!is_new_) {
     return {};
   }

@@ -31,7 +31,7 @@ class DspLoad {
 
   // Returns the new limit on the number of voices if it changes now. `sounding` voices sound of
   // `all`; a limit of `all` is none.
-  std::optional<int> judge(int sounding, int all);
+  std::optional<int> update_limit(int sounding, int all);
   int limit() const { return limit_; }  // voices; 0: no limit
 
   // Removes the limit and forgets the measurements, because another model plays from now on.
@@ -47,7 +47,7 @@ class DspLoad {
   double took_s_ = 0.0;  // of the current span
   double sound_s_ = 0.0;
   bool skips_ = false;   // ignore this span: stolen voices still fade in it
-  bool is_new_ = false;  // `lasting_` has changed since the last judge()
+  bool is_new_ = false;  // `lasting_` has changed since the last update_limit()
   std::array<double, spans> loads_{};
   std::size_t next_ = 0;
   int limit_ = 0;         // voices; 0: no limit

@@ -15,7 +15,7 @@ struct MotionFrame {
 
   std::uint64_t frame = 0;    // samples played so far
   std::uint32_t picture = 0;  // PlayingEngine::picture; 0: nothing to draw
-  std::size_t count = 0;      // numbers in use, as Engine::look() returns them
+  std::size_t count = 0;      // numbers in use, as Engine::read_positions() returns them
   std::vector<double> numbers = std::vector<double>(most_numbers);
   std::array<float, heard_samples> heard{};  // the latest output, mean of all channels
 };

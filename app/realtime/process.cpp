@@ -526,7 +526,7 @@ void Process::limit_load(double took_s, std::size_t frames) {
   }
   const double load = load_.lasting();
   const int before = load_.limit();
-  if (const auto voices = load_.judge(meters_.stepped, current_->engine->voice_count())) {
+  if (const auto voices = load_.update_limit(meters_.stepped, current_->engine->voice_count())) {
     log_record({.frame = frame_,
                 .kind = FlightRecord::Kind::limit,
                 .count = static_cast<std::uint32_t>(std::max(0, *voices))});
@@ -664,12 +664,12 @@ void Process::write_motion() {
   MotionFrame& out = motion.writing();
   if (strobed_ != nullptr) {
     const bool is_here = strobed_ == current_;
-    const std::size_t count = is_here ? current_->engine->take_slow_look() : 0;
+    const std::size_t count = is_here ? current_->engine->take_slow_view() : 0;
     if (count == 0 && is_here && frame_ < strobed_until_) {
       return;
     }
     if (is_here || strobed_ == fading_) {
-      strobed_->engine->look_slowly({});
+      strobed_->engine->request_slow_view({});
     }
     strobed_ = nullptr;
     if (count > 0) {
@@ -680,12 +680,13 @@ void Process::write_motion() {
   }
   const bool is_slow = wants_slow_motion.lower();
   if (is_slow && current_ != nullptr && current_->picture != 0 &&
-      current_->engine->look_slowly(out.numbers)) {
+      current_->engine->request_slow_view(out.numbers)) {
     strobed_ = current_;
     strobed_until_ = frame_ + static_cast<std::int64_t>(longest_strobe_s * rate_hz_);
   } else if (wants_motion.lower() || is_slow) {
-    out.count =
-        current_ != nullptr && current_->picture != 0 ? current_->engine->look(out.numbers) : 0;
+    out.count = current_ != nullptr && current_->picture != 0
+                    ? current_->engine->read_positions(out.numbers)
+                    : 0;
     publish_motion();
   }
 }

@@ -57,7 +57,7 @@ CompiledScene compile_to_play(const Scene& scene, const CompileOptions& options,
         in_model(scene, *compiled->strong_bow, is_strict ? Severity::error : Severity::warning));
   }
   const std::vector<Part>& parts = compiled->plan.parts;
-  const auto broken = broken_promise(compiled->plan);
+  const auto broken = missed_budget(compiled->plan);
   if (broken &&
       std::none_of(parts.begin(), parts.end(), [](const Part& part) { return part.may_gain; })) {
     Finding finding = finding_of(scene.path, "", Error{*broken});

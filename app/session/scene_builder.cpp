@@ -215,7 +215,7 @@ void SceneBuilder::improve() {
   }
   const std::string overload = overload_warning(compiled->plan, compiled->instrument.voices,
                                                 source.options.rate_hz, source.options.precision);
-  const auto broken = broken_promise(compiled->plan);
+  const auto broken = missed_budget(compiled->plan);
   current_.set_plan(std::move(compiled->plan));
   FlightEngine made_of = source.made_of;
   made_of.gain = source.preset.gain;

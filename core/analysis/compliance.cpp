@@ -43,7 +43,7 @@ Network always_touching(const Network& network, std::span<const Range> arguments
   felt.links.clear();
   for (std::uint32_t i = 0; i < network.links.size(); ++i) {
     const Assembly::Term term{.element = i, .is_link = true};
-    if (!facts_of(network.links[i].law).lets_go() ||
+    if (!facts_of(network.links[i].law).can_detach() ||
         !(lowest_load(network, term, arguments, rate_ratio).stiff >= 0.0)) {
       felt.links.push_back(network.links[i]);
     }

@@ -20,24 +20,25 @@ namespace {
 
 // Returns the region where a budget of pitch and decay has to hold: the ranges of the parameters
 // and every key or, for a bare network, the values that its parameters will get.
-Promise make_promise(const CompileRequest& request, const Analysis& analysis, const Proof& proof) {
+BudgetRegion make_budget_region(const CompileRequest& request, const Analysis& analysis,
+                                const Proof& proof) {
   if (!request.budget.is_physical()) {
     return {};
   }
-  Promise promise{.highest_factor = analysis.shapes ? std::max(1.0, proof.margins.keys) : 1.0};
+  BudgetRegion region{.highest_factor = analysis.shapes ? std::max(1.0, proof.margins.keys) : 1.0};
   const std::vector<double>& start = analysis.start;
   for (std::size_t i = 0; i < start.size(); ++i) {
     const ParameterInfo& info = proof.stability.parameters[i];
-    promise.lowest.push_back(request.options.bare ? start[i] : info.minimum);
-    promise.highest.push_back(request.options.bare ? start[i] : info.maximum);
+    region.lowest.push_back(request.options.bare ? start[i] : info.minimum);
+    region.highest.push_back(request.options.bare ? start[i] : info.maximum);
     for (const Setting& setting : request.options.reach) {
       if (request.options.bare && setting.parameter == info.name) {
-        promise.lowest[i] = std::min(promise.lowest[i], setting.value);
-        promise.highest[i] = std::max(promise.highest[i], setting.value);
+        region.lowest[i] = std::min(region.lowest[i], setting.value);
+        region.highest[i] = std::max(region.highest[i], setting.value);
       }
     }
   }
-  return promise;
+  return region;
 }
 
 // Returns the factor on every stiffness that the highest key requires: the factor of exact modes if
@@ -83,7 +84,7 @@ Planned plan(const CompileRequest& request, const Analysis& analysis, const Proo
       .executor = options.executor};
   return make_plan(std::move(machine), load,
                    request.is_published() ? Method::direct : options.method, options.most_modes,
-                   request.budget, options.progress, make_promise(request, analysis, proof),
+                   request.budget, options.progress, make_budget_region(request, analysis, proof),
                    {.timings = options.timings, .forms = options.forms});
 }
 

@@ -55,23 +55,23 @@ class Chooser {
         budget_(budget) {}
 
   // Chooses a form that keeps the remaining budget of pitch and decay.
-  Part choose(Judge& judge, const Accuracy& spent) {
+  Part choose(AccuracyMeter& meter, const Accuracy& spent) {
     spent_ = spent;
-    judge_ = &judge;
-    const Accuracy published = sum_of(judge.of(Form()), spent_);
+    meter_ = &meter;
+    const Accuracy published = sum_of(meter.of(Form()), spent_);
     if (published.meets(budget_)) {
       budget_.cents = budget_.t60_percent = Budget::unlimited;
-      judge_ = nullptr;
+      meter_ = nullptr;
     } else {
       published_ = ", as published " + describe(published);
     }
     Part part = choose();
-    part.accuracy = judge_ == nullptr ? published : accuracy_;
+    part.accuracy = meter_ == nullptr ? published : accuracy_;
     return part;
   }
 
   Part choose() {
-    if (judge_ != nullptr) {
+    if (meter_ != nullptr) {
       consider_physical();
     } else {
       consider_identical();
@@ -84,9 +84,9 @@ class Chooser {
 
   // Chooses exact modes, which are stable at any stiffness, or enough steps a sample for the
   // stiffest key; nothing if the part has neither.
-  std::optional<Part> reach(Judge* judge, const Accuracy& spent) {
+  std::optional<Part> reach(AccuracyMeter* meter, const Accuracy& spent) {
     spent_ = spent;
-    judge_ = judge;
+    meter_ = meter;
     // Modes contain only the linear part of a nonlinear spring. The rest uses the published scheme,
     // so its stability limit applies.
     if (eigenvectors_of_ <= most_modes_ && !contains_bent_springs(program_)) {
@@ -171,7 +171,7 @@ class Chooser {
   // whether it meets the budget.
   bool consider_steps(std::uint32_t times) {
     Program fine = oversampled_program(program_, times);
-    const Accuracy accuracy = judge_->of(oversampled_form(std::move(fine), times));
+    const Accuracy accuracy = meter_->of(oversampled_form(std::move(fine), times));
     if (!accuracy.is_known) {
       return false;
     }
@@ -226,7 +226,7 @@ class Chooser {
   // Returns the factor by which the budget is exceeded: 1 if it is kept, unlimited if the error is
   // not known.
   double excess(const Candidate& c) const {
-    return judge_ == nullptr      ? 1.0
+    return meter_ == nullptr      ? 1.0
            : !c.accuracy.is_known ? Budget::unlimited
                                   : std::max({1.0, c.accuracy.cents / budget_.cents,
                                               c.accuracy.t60_percent / budget_.t60_percent});
@@ -238,7 +238,7 @@ class Chooser {
   // Ranks by excess, then by cost. Among forms with unknown error, the published scheme is first.
   bool is_better(const Candidate& a, const Candidate& b) const {
     const bool is_published = a.method == Method::direct;
-    if (judge_ != nullptr && !a.accuracy.is_known && !b.accuracy.is_known &&
+    if (meter_ != nullptr && !a.accuracy.is_known && !b.accuracy.is_known &&
         is_published != (b.method == Method::direct)) {
       return !is_published;
     }
@@ -246,8 +246,8 @@ class Chooser {
   }
 
   void add(Method method, Form form, std::optional<Accuracy> of_form = {}) {
-    if (judge_ != nullptr && !of_form) {
-      of_form = judge_->of(form);
+    if (meter_ != nullptr && !of_form) {
+      of_form = meter_->of(form);
     }
     const Accuracy accuracy = of_form ? sum_of(*of_form, spent_) : Accuracy{};
     program_.form = std::move(form);
@@ -345,7 +345,7 @@ class Chooser {
               .voices = load_.voices,
               .is_untimed = is_untimed_,
               .reason = description(program_)};
-    part.reason += judge_ != nullptr ? ", " + describe(accuracy_) : "";
+    part.reason += meter_ != nullptr ? ", " + describe(accuracy_) : "";
     part.reason += published_;
     part.reason += !others.empty() ? ", " + others : "";
     return part;
@@ -359,7 +359,7 @@ class Chooser {
   std::uint32_t most_modes_;
   std::uint32_t eigenvectors_of_;  // connected masses
   Budget budget_;                  // without the limits that the published scheme keeps
-  Judge* judge_ = nullptr;         // null: the published scheme is accurate enough
+  AccuracyMeter* meter_ = nullptr;  // null: the published scheme is accurate enough
   Accuracy spent_;
   Accuracy accuracy_;      // of the chosen form
   std::string published_;  // the error of the published scheme, if it is too large
@@ -376,8 +376,8 @@ std::string recorded_form(const Choice& choice, std::size_t part) {
 
 // Plans all parts in forms that are stable for the stiffest key; nothing if one part has none.
 std::optional<Planned> reach(const Machine& machine, const Workload& load, std::uint32_t most_modes,
-                             const Budget& budget, const Progress& progress, const Promise& promise,
-                             const Choice& choice, bool& may_gain) {
+                             const Budget& budget, const Progress& progress,
+                             const BudgetRegion& region, const Choice& choice, bool& may_gain) {
   Planned planned{machine, {}, Budget::unlimited};
   for (Program& program : planned.machine.parts) {
     if (program.moving == 0) {
@@ -385,20 +385,20 @@ std::optional<Planned> reach(const Machine& machine, const Workload& load, std::
     }
     Chooser chooser(program, load, most_modes, budget, progress, choice.timings,
                     recorded_form(choice, planned.parts.size()));
-    std::optional<Judge> judge;
+    std::optional<AccuracyMeter> meter;
     if (budget.is_physical()) {
-      judge.emplace(program,
-                    corners_of(program, machine.parameters, promise.lowest, promise.highest,
+      meter.emplace(program,
+                    corners_of(program, machine.parameters, region.lowest, region.highest,
                                load.wanted_factor),
                     most_modes, progress);
     }
-    std::optional<Part> part = chooser.reach(judge ? &*judge : nullptr, promise.merged);
+    std::optional<Part> part = chooser.reach(meter ? &*meter : nullptr, region.merged);
     may_gain |= chooser.may_gain();
     if (!part) {
       return std::nullopt;
     }
-    if (judge) {
-      part->accuracy = sum_of(judge->of(program.form), promise.merged);
+    if (meter) {
+      part->accuracy = sum_of(meter->of(program.form), region.merged);
     }
     if (const auto* steps = program.form.get_if<Oversampled>()) {
       planned.more = std::min(planned.more, static_cast<double>(steps->times * steps->times));
@@ -412,12 +412,12 @@ std::optional<Planned> reach(const Machine& machine, const Workload& load, std::
 
 Planned make_plan(Machine machine, const Workload& load, std::optional<Method> method,
                   std::uint32_t most_modes, const Budget& budget, const Progress& progress,
-                  const Promise& promise, const Choice& choice) {
+                  const BudgetRegion& region, const Choice& choice) {
   std::vector<Part> parts;
   bool may_gain = false;
   if (load.reaches_beyond() && !method) {
     if (auto planned =
-            reach(machine, load, most_modes, budget, progress, promise, choice, may_gain)) {
+            reach(machine, load, most_modes, budget, progress, region, choice, may_gain)) {
       return *std::move(planned);
     }
   }
@@ -426,18 +426,18 @@ Planned make_plan(Machine machine, const Workload& load, std::optional<Method> m
   for (Program& program : machine.parts) {
     Chooser chooser(program, published, most_modes, budget, progress, choice.timings,
                     recorded_form(choice, parts.size()));
-    std::optional<Judge> judge;
+    std::optional<AccuracyMeter> meter;
     if (budget.is_physical() && program.moving > 0 && program.waveguides.empty()) {
-      judge.emplace(program,
-                    corners_of(program, machine.parameters, promise.lowest, promise.highest,
-                               promise.highest_factor),
+      meter.emplace(program,
+                    corners_of(program, machine.parameters, region.lowest, region.highest,
+                               region.highest_factor),
                     most_modes, progress);
     }
     Part part = method  ? chooser.obey(*method)
-                : judge ? chooser.choose(*judge, promise.merged)
+                : meter ? chooser.choose(*meter, region.merged)
                         : chooser.choose();
-    if (judge && !part.accuracy) {
-      part.accuracy = sum_of(judge->of(program.form), promise.merged);
+    if (meter && !part.accuracy) {
+      part.accuracy = sum_of(meter->of(program.form), region.merged);
     }
     if (auto shards = share_out(program, load, progress)) {
       program.form = *std::move(shards);
@@ -471,7 +471,7 @@ std::optional<Accuracy> accuracy_of(const std::vector<Part>& parts) {
   return worst;
 }
 
-std::optional<std::string> broken_promise(const Plan& plan) {
+std::optional<std::string> missed_budget(const Plan& plan) {
   if (!plan.accuracy || plan.accuracy->meets(plan.budget)) {
     return std::nullopt;
   }

@@ -60,7 +60,7 @@ struct Planned {
 
 // The parameter box and the keys for which a budget of pitch and decay has to hold, and what
 // merging has already used of it.
-struct Promise {
+struct BudgetRegion {
   std::vector<double> lowest;  // [parameter]; empty: no parameter moves
   std::vector<double> highest;
   double highest_factor = 1.0;  // of the highest key
@@ -90,10 +90,10 @@ struct Choice {
 // estimate half a core is enough for it. Otherwise no part does.
 //
 // O(elements), plus the eigenvectors of a part of up to `most_modes` masses if modes may be
-// cheaper, plus the time of a Judge. [any thread but audio]
+// cheaper, plus the time of a AccuracyMeter. [any thread but audio]
 Planned make_plan(Machine machine, const Workload& load, std::optional<Method> method = {},
                   std::uint32_t most_modes = patient_modes, const Budget& budget = {},
-                  const Progress& progress = {}, const Promise& promise = {},
+                  const Progress& progress = {}, const BudgetRegion& region = {},
                   const Choice& choice = {});
 
 // Returns Part::form of every part, for Choice::forms.
@@ -103,7 +103,7 @@ std::vector<std::string> forms_of(const Plan& plan);
 std::optional<Accuracy> accuracy_of(const std::vector<Part>& parts);
 
 // Returns a sentence about the budget of pitch and decay if the plan exceeds it; otherwise nothing.
-std::optional<std::string> broken_promise(const Plan& plan);
+std::optional<std::string> missed_budget(const Plan& plan);
 
 // Return one line for each part, and one for each note.
 std::string describe(const std::vector<Part>& parts);

@@ -23,7 +23,7 @@ std::vector<std::optional<RestBound>> make_rest_bounds(const Network& network,
     compliance_of[output.mass] = 0.0;
   }
   for (const Link& link : network.links) {
-    if (facts_of(link.law).lets_go()) {
+    if (facts_of(link.law).can_detach()) {
       compliance_of[link.a] = compliance_of[link.b] = 0.0;
     }
   }
@@ -60,7 +60,7 @@ std::vector<std::optional<RestBound>> make_rest_bounds(const Network& network,
     }
     for (std::uint32_t i = 0; i < program.origins.size(); ++i) {
       const Link& link = network.links[program.origins[i]];
-      if (facts_of(link.law).lets_go()) {
+      if (facts_of(link.law).can_detach()) {
         const double root = std::sqrt(compliance_of[link.a]) + std::sqrt(compliance_of[link.b]);
         bound.reaches.push_back({i, root * root});
       }

@@ -429,7 +429,7 @@ struct Engine::Player {
     return meters;
   }
 
-  bool look_slowly(std::span<double> numbers) {
+  bool request_slow_view(std::span<double> numbers) {
     const Voice& voice = voices[voices.latest()];
     const bool has_pitch = !playing.pitches.factors.empty() && voice.awake;
     viewer.request_slow_view(
@@ -557,17 +557,17 @@ void Engine::watch(std::vector<Watched> parts) {
   player_->viewer.watch(std::move(parts));
 }
 
-std::size_t Engine::look(std::span<double> numbers) const {
+std::size_t Engine::read_positions(std::span<double> numbers) const {
   return std::visit(
       [&](const auto& b) { return player_->viewer.read(b, player_->voices.latest(), numbers); },
       player_->bank);
 }
 
-bool Engine::look_slowly(std::span<double> numbers) {
-  return player_->look_slowly(numbers);
+bool Engine::request_slow_view(std::span<double> numbers) {
+  return player_->request_slow_view(numbers);
 }
 
-std::size_t Engine::take_slow_look() {
+std::size_t Engine::take_slow_view() {
   return player_->viewer.take_slow_view();
 }
 

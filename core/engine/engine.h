@@ -66,23 +66,24 @@ class Engine {
   double parameter(std::uint16_t index) const;  // [audio]
   static constexpr std::size_t max_changes = max_parameter_changes;
 
-  // Selects what look() shows: [part]. Called before the engine plays. [any thread but audio]
+  // Selects what read_positions() shows: [part]. Called before the engine plays. [any thread but
+  // audio]
   using Watched = WatchedPart;
   static constexpr std::size_t waveguide_points = engine::waveguide_points;
   void watch(std::vector<Watched> parts);
   // Writes the positions of the watched nodes of the voice that was played last, and
   // waveguide_points of each watched waveguide, part by part, until `numbers` is full. Returns how
   // many numbers it wrote. [audio] wait-free, O(numbers + the waveguides' samples)
-  std::size_t look(std::span<double> numbers) const;
+  std::size_t read_positions(std::span<double> numbers) const;
 
   // Requests the same as a stroboscope shows it. process() takes the view at the first block end at
   // which a motion of the voice's frequency has the phase that it would have with a period of
   // strobe_period_s. A new request replaces the last one; an empty `numbers` cancels it. Returns
   // false if no pitch is known. [audio] wait-free
   static constexpr double strobe_period_s = engine::strobe_period_s;
-  bool look_slowly(std::span<double> numbers);
+  bool request_slow_view(std::span<double> numbers);
   // Returns how many numbers the view has written, once; 0 before that. [audio] wait-free
-  std::size_t take_slow_look();
+  std::size_t take_slow_view();
 
   const Machine& machine() const;  // [any thread]
   int output_count() const;        // [any thread]

@@ -56,7 +56,7 @@ void set_one_sample_before(Bank<T>& bank, PartBank<T>& part, std::size_t lane) {
     }
   }
   kernel.set_state(lane % part.width, bank.x.data(), bank.v.data());
-  kernel.let_go(lane % part.width);
+  kernel.disable_links(lane % part.width);
 }
 
 // Takes over the voices of one kernel.
@@ -73,7 +73,7 @@ void take_over(Bank<T>& bank, PartBank<T>& part, const PartBank<T>& from, const 
     }
     any = true;
     from.of(lane).save(lane % from.width, bank.x.data(), bank.v.data());
-    coefficients.go_on(lane % part.width, from.of(lane).coefficients, lane % from.width);
+    coefficients.copy_lane(lane % part.width, from.of(lane).coefficients, lane % from.width);
     for (std::size_t i = 0; i < program.inputs.size(); ++i) {
       const InputSlot& input = program.inputs[i];
       const std::size_t at = i * part.width + lane - group.first;

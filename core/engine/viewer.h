@@ -36,11 +36,12 @@ class Viewer {
       const Kernel<T>& kernel = bank.parts[p].of(lane);
       const std::size_t within = lane % bank.parts[p].width;
       if (!wanted.nodes.empty()) {
-        add(kernel.look(within, wanted.nodes, numbers.subspan(at)));
+        add(kernel.read_positions(within, wanted.nodes, numbers.subspan(at)));
       }
       for (std::size_t i = 0; i < wanted.waveguides && !is_full; ++i) {
         const std::size_t room = std::min(waveguide_points, numbers.size() - at);
-        add(room < waveguide_points ? 0 : kernel.look_along(within, i, numbers.subspan(at, room)));
+        add(room < waveguide_points ? 0
+                                    : kernel.read_waveguide(within, i, numbers.subspan(at, room)));
       }
     }
     return at;

@@ -42,7 +42,7 @@ void Coefficients<T>::ramp(std::size_t frames) {
 }
 
 template <class T>
-void Coefficients<T>::go_on(std::size_t lane, const Coefficients& from, std::size_t from_lane) {
+void Coefficients<T>::copy_lane(std::size_t lane, const Coefficients& from, std::size_t from_lane) {
   for (std::uint32_t c = 0; c < is_ramping.size(); ++c) {
     const std::size_t there = c * from.width + from_lane;
     set(lane, c, static_cast<double>(from.value[there]), false);

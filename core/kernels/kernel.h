@@ -40,7 +40,7 @@ class Coefficients {
   void set(std::size_t lane, std::uint32_t c, double value, bool ramped);
   void ramp(std::size_t frames);
   // Copies one lane, including its ramps, from another kernel of the same Program.
-  void go_on(std::size_t lane, const Coefficients& from, std::size_t from_lane);
+  void copy_lane(std::size_t lane, const Coefficients& from, std::size_t from_lane);
   // Ends the ramps that a block of `frames` samples has completed. The kernel updates the values.
   void finish(std::size_t frames);
 
@@ -97,10 +97,10 @@ struct Awake {
   std::size_t of = 0;  // 0 if the kernel has no modes
 };
 
-// Implements look() for kernels that keep a position of every node.
+// Implements read_positions() for kernels that keep a position of every node.
 template <class Position>
-std::size_t look_at(std::span<const std::uint32_t> nodes, std::span<double> numbers,
-                    Position&& position) {
+std::size_t copy_positions(std::span<const std::uint32_t> nodes, std::span<double> numbers,
+                           Position&& position) {
   if (numbers.size() < nodes.size()) {
     return 0;
   }
@@ -130,7 +130,7 @@ class Kernel {
   virtual void set_state(std::size_t lane, const double* x, const double* v) = 0;
   // Disables passive links in the sample after set_state(), too: that sample only reproduces the
   // state of another kernel. [audio]
-  virtual void let_go(std::size_t) {}
+  virtual void disable_links(std::size_t) {}
   // Sets one lane to the initial state of the model.
   void reset(std::size_t lane) { set_state(lane, start_.position.data(), start_.velocity.data()); }
   // Copies the position and velocity of every node after the last sample. Returns false if the
@@ -148,7 +148,7 @@ class Kernel {
                       std::span<const double> changes) = 0;
   // Copies the state of another kernel of the same Program and the same number of voices. The next
   // samples are the same to the bit. Returns false if the kernel does not support this. [audio]
-  virtual bool become(const Kernel&) { return false; }
+  virtual bool copy_from(const Kernel&) { return false; }
   // Computes a block by the published scheme, symplectic Euler: v += F/M, x += v. In each sample
   // masses move first, then position inputs, then the links compute their forces for the next
   // sample. The outputs are the new positions. Input forces act in their own sample. [audio]
@@ -161,11 +161,13 @@ class Kernel {
   // Copies, for a picture, the positions of some nodes after the last sample. A modal kernel copies
   // the displacements of all modes instead. Returns the count of numbers; 0 if `numbers` is too
   // small. [audio] O(numbers)
-  virtual std::size_t look(std::size_t lane, std::span<const std::uint32_t> nodes,
-                           std::span<double> numbers) const = 0;
+  virtual std::size_t read_positions(std::size_t lane, std::span<const std::uint32_t> nodes,
+                                     std::span<double> numbers) const = 0;
   // Copies the displacement of a waveguide at equally spaced points from its left to its right end.
   // Returns 0 if there is no such waveguide. [audio] O(samples + numbers)
-  virtual std::size_t look_along(std::size_t, std::size_t, std::span<double>) const { return 0; }
+  virtual std::size_t read_waveguide(std::size_t, std::size_t, std::span<double>) const {
+    return 0;
+  }
   virtual Awake awake() const { return {}; }  // [audio]
 
   Coefficients<T> coefficients;

@@ -86,7 +86,7 @@ class Trial {
   void close_gaps() {
     for (const LinkRun& run : program_.link_runs) {
       const LawFacts& law = facts_of(run.law);
-      if (!law.lets_go()) {
+      if (!law.can_detach()) {
         continue;
       }
       LawNumbers numbers{};

@@ -92,7 +92,7 @@ void Nodes<T>::set(std::size_t lane, const double* x, const double* v) {
 }
 
 template <class T>
-void Nodes<T>::become(const Nodes& from) {
+void Nodes<T>::copy_from(const Nodes& from) {
   numbers = from.numbers;
   corners = from.corners;
   places.placed = from.places.placed;
@@ -179,9 +179,9 @@ bool NodeKernel<T>::is_near_start(std::size_t lane, double bound) const {
 }
 
 template <class T>
-std::size_t NodeKernel<T>::look(std::size_t lane, std::span<const std::uint32_t> nodes,
-                                std::span<double> numbers) const {
-  return look_at(nodes, numbers, [&](std::uint32_t node) {
+std::size_t NodeKernel<T>::read_positions(std::size_t lane, std::span<const std::uint32_t> nodes,
+                                          std::span<double> numbers) const {
+  return copy_positions(nodes, numbers, [&](std::uint32_t node) {
     const double x = nodes_.position(node, lane);
     return is_junction(program_, node) ? x - nodes_.velocity(node, lane) / 2
                                        : x;  // as in its outputs

@@ -59,7 +59,7 @@ struct Nodes {
   // Sets the nodes of a lane and clears all other rows.
   void set(std::size_t lane, const double* x, const double* v);
   // Copies all state from nodes of the same layout.
-  void become(const Nodes& from);
+  void copy_from(const Nodes& from);
 
   NodeLayout layout;
   Aligned<T> numbers;
@@ -79,14 +79,14 @@ template <class T>
 class NodeKernel : public Kernel<T> {
  public:
   void set_state(std::size_t lane, const double* x, const double* v) final;
-  void let_go(std::size_t lane) final { nodes_.passive.awake[lane] = T(-1); }
+  void disable_links(std::size_t lane) final { nodes_.passive.awake[lane] = T(-1); }
   bool save(std::size_t lane, double* x, double* v) const final;
   bool read(std::span<const std::uint32_t> nodes, T* x, T* v) const final;
   void strike(std::size_t lane, std::span<const std::uint32_t> nodes,
               std::span<const double> changes) final;
   bool is_near_start(std::size_t lane, double bound) const final;
-  std::size_t look(std::size_t lane, std::span<const std::uint32_t> nodes,
-                   std::span<double> numbers) const final;
+  std::size_t read_positions(std::size_t lane, std::span<const std::uint32_t> nodes,
+                             std::span<double> numbers) const final;
 
  protected:
   NodeKernel(const Program& program, NodeLayout layout)
@@ -95,11 +95,11 @@ class NodeKernel : public Kernel<T> {
         nodes_(program, std::move(layout)) {}
   // Sets all lanes to the initial state. A constructor calls it last.
   void reset_lanes();
-  // Copies coefficients and nodes: a part of become().
-  const NodeKernel& become_nodes(const Kernel<T>& from) {
+  // Copies coefficients and nodes: a part of copy_from().
+  const NodeKernel& copy_nodes(const Kernel<T>& from) {
     const auto& other = static_cast<const NodeKernel&>(from);
     this->coefficients = other.coefficients;
-    nodes_.become(other.nodes_);
+    nodes_.copy_from(other.nodes_);
     return other;
   }
   // Writes the state of nodes: write_nodes() without the forces that follow from it.

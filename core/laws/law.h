@@ -139,7 +139,7 @@ struct LawFacts {
   // Returns true if the law has a stiffness and acts at every distance.
   constexpr bool is_spring() const { return zone == Zone::everywhere && !is_friction; }
   // Returns true if the law exerts no force between distant ends.
-  constexpr bool lets_go() const { return zone == Zone::near || zone == Zone::below; }
+  constexpr bool can_detach() const { return zone == Zone::near || zone == Zone::below; }
   // Returns true for a contact: it acts while b is below a.
   constexpr bool is_one_sided() const { return zone == Zone::below; }
   // Returns the distance from d to where the law begins to act; not positive where it acts.

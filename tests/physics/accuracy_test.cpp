@@ -327,7 +327,7 @@ void judge(std::uint64_t seed, const Budget& budget, Tally& tally) {
   const bool is_near =
       are_near(wanted, found, budget.cents + noise_cents, budget.t60_percent + noise_percent);
   REQUIRE(plan.accuracy);
-  const bool is_stated = broken_promise(plan).has_value();
+  const bool is_stated = missed_budget(plan).has_value();
   tally.met += is_near && !is_stated ? 1 : 0;
   tally.stated += is_stated ? 1 : 0;
   if (!is_near && !is_stated) {
@@ -399,7 +399,7 @@ TEST_CASE("A budget holds over the whole range of a parameter", "[accuracy]") {
   const Plan wide = plan_of(text, preset, {.cents = 20.0});
   REQUIRE(wide.accuracy);
   CHECK(wide.accuracy->cents == Approx(cents_of(0.2)).epsilon(1e-9));
-  CHECK_FALSE(broken_promise(plan_of(text, preset, budget)));
+  CHECK_FALSE(missed_budget(plan_of(text, preset, budget)));
   CHECK(plan_of(text, preset, budget).accuracy->cents < 1.0);
 }
 
@@ -463,7 +463,7 @@ TEST_CASE("Nonlinear springs keep a budget of pitch at small amplitudes", "[accu
     const Budget budget{.cents = cents, .passive = Passivity::always};
     CHECK(std::fabs(off_cents(heard_hz(1e-6, budget), rest_hz)) < cents);
     CHECK_FALSE(
-        broken_promise(plan_of(text, default_preset(support::network_of(text), true), budget)));
+        missed_budget(plan_of(text, default_preset(support::network_of(text), true), budget)));
   }
   const double sharp_hz = exact_hz(0.1);
   CHECK(off_cents(sharp_hz, rest_hz) > 350.0);
@@ -489,12 +489,12 @@ TEST_CASE("A budget is not reported as kept if the error is unknown", "[accuracy
   REQUIRE(proportional.accuracy);
   CHECK(proportional.accuracy->is_known);
   CHECK(proportional.accuracy->is_bound);  // limited by the stiffness of the fastest mode
-  CHECK_FALSE(broken_promise(proportional));
+  CHECK_FALSE(missed_budget(proportional));
   const Plan crossed = plan_for(mesh + "@g ground 0.\n@d springDamper @g [@m 0.2 0.3] 0. 0.02\n");
   REQUIRE(crossed.accuracy);
   CHECK_FALSE(crossed.accuracy->is_known);
-  REQUIRE(broken_promise(crossed));
-  CHECK(broken_promise(crossed)->find("not known") != std::string::npos);
+  REQUIRE(missed_budget(crossed));
+  CHECK(missed_budget(crossed)->find("not known") != std::string::npos);
 }
 
 }  // namespace

@@ -72,9 +72,9 @@ inline Score score_of(const Program& program, const ComparisonOptions& options) 
 
 // One kernel, played block by block.
 template <class T>
-class Fighter {
+class KernelRunner {
  public:
-  Fighter(const Program& program, double pitch, Isa isa)
+  KernelRunner(const Program& program, double pitch, Isa isa)
       : program_(program),
         kernel_(make_kernel<T>(program_, 1, isa)),
         width_(kernel_->width()),
@@ -164,7 +164,7 @@ class Fighter {
 // [frame][output]
 template <class T>
 std::vector<double> perform(const Program& program, const Score& score, Isa isa) {
-  Fighter<T> fighter(program, score.pitch, isa);
+  KernelRunner<T> fighter(program, score.pitch, isa);
   const std::span inputs(score.inputs);
   const std::span audio(score.audio);
   std::vector<double> heard;

@@ -160,7 +160,7 @@ StoredEnergy stored_energy(const Program& program, std::span<const double> x,
       for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
         const double held = law.potential(x[program.ends[i].a] - x[program.ends[i].b]);
         energy.total += held;
-        energy.held += law.facts.lets_go() ? held : 0.0;
+        energy.held += law.facts.can_detach() ? held : 0.0;
       }
     });
   }

@@ -179,15 +179,15 @@ std::vector<Corner> corners_of(const Program& program, std::span<const double> s
   return corners;
 }
 
-Judge::Judge(const Program& program, std::vector<Corner> corners, std::size_t most_masses,
-             const Progress& progress)
+AccuracyMeter::AccuracyMeter(const Program& program, std::vector<Corner> corners,
+                             std::size_t most_masses, const Progress& progress)
     : program_(program),
       corners_(std::move(corners)),
       most_masses_(most_masses),
       progress_(progress),
       continuous_(corners_.size()) {}
 
-Accuracy Judge::of(const Form& form) {
+Accuracy AccuracyMeter::of(const Form& form) {
   const Stepping stepping = stepping_of(form);
   if (stepping.scheme == Stepping::Scheme::exact) {
     // Exact modes apply the linear spring of a nonlinear link as published.
@@ -200,7 +200,7 @@ Accuracy Judge::of(const Form& form) {
   return worst;
 }
 
-Poles Judge::Continuous::all_poles() const {
+Poles AccuracyMeter::Continuous::all_poles() const {
   Poles all = poles;
   for (const Mode& mode : modes) {
     if (const auto pole = continuous_pole(mode.stiffness, mode.damping)) {
@@ -210,7 +210,7 @@ Poles Judge::Continuous::all_poles() const {
   return all;
 }
 
-const Judge::Continuous& Judge::continuous_at(std::size_t corner) {
+const AccuracyMeter::Continuous& AccuracyMeter::continuous_at(std::size_t corner) {
   if (continuous_[corner]) {
     return *continuous_[corner];
   }
@@ -244,7 +244,7 @@ const Judge::Continuous& Judge::continuous_at(std::size_t corner) {
   return continuous;
 }
 
-Accuracy Judge::at(std::size_t corner, const Stepping& stepping) {
+Accuracy AccuracyMeter::at(std::size_t corner, const Stepping& stepping) {
   const Program& program = program_;
   const double rate_hz = program.rate_hz;
   const auto compare_modes = [&](const auto& modes) {

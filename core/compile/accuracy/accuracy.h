@@ -57,12 +57,12 @@ inline constexpr std::size_t most_coupled_masses = 200;
 
 // Computes the errors of the forms of one part at the same corners. Keeps the poles of the
 // continuous network. [any thread but audio]
-class Judge {
+class AccuracyMeter {
  public:
   // The Program outlives it. `most_masses`: largest part with proportional damping whose modes are
   // computed.
-  Judge(const Program& program, std::vector<Corner> corners, std::size_t most_masses,
-        const Progress& progress = {});
+  AccuracyMeter(const Program& program, std::vector<Corner> corners, std::size_t most_masses,
+                const Progress& progress = {});
 
   // Returns the error of a form of this Program. O(corners * masses^3)
   Accuracy of(const Form& form);

@@ -80,8 +80,8 @@ template <class T>
 class BatchKernel final : public NodeKernel<T> {
  public:
   BatchKernel(const Program& program, const Batch& batch, std::size_t voices, Isa isa);
-  bool become(const Kernel<T>& from) override {
-    this->become_nodes(from);
+  bool copy_from(const Kernel<T>& from) override {
+    this->copy_nodes(from);
     return true;
   }
   bool takes_common_inputs() const override { return true; }

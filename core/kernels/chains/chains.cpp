@@ -351,8 +351,8 @@ bool ChainsKernel<T>::write_nodes(std::span<const std::uint32_t> nodes, const T*
 }
 
 template <class T>
-bool ChainsKernel<T>::become(const Kernel<T>& from) {
-  const auto& other = static_cast<const ChainsKernel&>(this->become_nodes(from));
+bool ChainsKernel<T>::copy_from(const Kernel<T>& from) {
+  const auto& other = static_cast<const ChainsKernel&>(this->copy_nodes(from));
   held_ = other.held_;
   force_ = other.force_;
   tap_pull_ = other.tap_pull_;

@@ -179,7 +179,7 @@ class ChainsKernel final : public NodeKernel<T> {
  public:
   ChainsKernel(const Program& program, const Chains& form, std::size_t voices, Isa isa);
   bool write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v) override;
-  bool become(const Kernel<T>& from) override;
+  bool copy_from(const Kernel<T>& from) override;
 
  private:
   ChainsKernel(const Program& program, const Chains& form, ChainsTables tables, FoldedBy by,

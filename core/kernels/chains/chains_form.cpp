@@ -174,7 +174,7 @@ class ChainFinder {
     }
     std::uint32_t left = held_by(near_[row.front()].holder, row.front(), springs);
     std::uint32_t right = held_by(near_[row.back()].holder, row.back(), springs);
-    if (stands(program_, left) && !stands(program_, right)) {
+    if (is_fixed_ground(program_, left) && !is_fixed_ground(program_, right)) {
       std::swap(left, right);
       std::reverse(row.begin(), row.end());
     }
@@ -273,7 +273,7 @@ bool is_simple(const Program& program, const Chains& form) {
   const MassRun& mass = program.mass_runs[chain.mass_run];
   const auto is_force = [](const OutputSlot& output) { return output.is_force; };
   return form.chains.size() == 1 && !chain.is_stiff && !mass.is_oscillator && !mass.has_gravity &&
-         program.taps.empty() && is_plain(program) && stands(program, chain.right) &&
+         program.taps.empty() && is_plain(program) && is_fixed_ground(program, chain.right) &&
          std::none_of(program.outputs.begin(), program.outputs.end(), is_force);
 }
 
@@ -287,7 +287,7 @@ std::size_t short_packs(std::size_t least, std::size_t most, std::index_sequence
 
 }  // namespace
 
-bool stands(const Program& program, std::uint32_t node) {
+bool is_fixed_ground(const Program& program, std::uint32_t node) {
   return node != Chain::free &&
          std::none_of(program.inputs.begin(), program.inputs.end(),
                       [&](const InputSlot& input) { return input.node == node; });

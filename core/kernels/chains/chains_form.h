@@ -57,7 +57,7 @@ inline constexpr std::uint32_t least_chain_masses = 8;  // Shorter chains are no
 std::optional<Chains> chains_form(const Program& program, const Progress& progress = {});
 
 // Returns whether the node is a ground, which never moves. [any thread]
-bool stands(const Program& program, std::uint32_t node);
+bool is_fixed_ground(const Program& program, std::uint32_t node);
 
 // The pack width, and the number of packs of a chain that stays in registers; 0: none.
 struct FoldedBy {

@@ -145,7 +145,7 @@ Reach<typename S::Number> reach_of(const LinkRun& run, const S& s) {
   using T = typename S::Number;
   constexpr T far = std::numeric_limits<T>::infinity();
   constexpr const LawFacts& law = ForceLaw::facts;
-  if constexpr (law.lets_go()) {
+  if constexpr (law.can_detach()) {
     const T reach = s.coefficient[run.coefficients[law.slot(Role::reach)]];
     return {-reach, law.zone == Zone::near ? reach : far};
   } else {

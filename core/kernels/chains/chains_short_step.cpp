@@ -22,7 +22,8 @@ struct ShortBody {
 };
 
 template <class S, std::size_t packs>
-void weigh(ShortBody<typename S::V, packs>& body, const FoldedChain& chain, const S& s) {
+void fill_inverse_masses(ShortBody<typename S::V, packs>& body, const FoldedChain& chain,
+                         const S& s) {
   using V = typename S::V;
   const V inverse_mass = all<V>(s.coefficient[chain.mass.inverse_mass]);
   each_below<packs>([&](auto i) {
@@ -167,7 +168,7 @@ template <class S, std::size_t packs, class T>
     body.v[i] = pairs[2 * i + 1];
   });
   T inverse_mass = s.coefficient[chain.mass.inverse_mass];
-  weigh(body, chain, s);
+  fill_inverse_masses(body, chain, s);
   std::size_t frame = 0;
   if (!has_sites && !has_others && program.audio_coefficients.empty() &&
       are_springs_all_that_ramps(chain, ramps)) {
@@ -182,7 +183,7 @@ template <class S, std::size_t packs, class T>
       }
       if (s.coefficient[chain.mass.inverse_mass] != inverse_mass) {
         inverse_mass = s.coefficient[chain.mass.inverse_mass];
-        weigh(body, chain, s);
+        fill_inverse_masses(body, chain, s);
       }
     }
     if (has_others) {

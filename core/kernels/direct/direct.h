@@ -72,13 +72,13 @@ class DirectKernel final : public NodeKernel<T> {
  public:
   DirectKernel(const Program& program, const Direct& form, std::size_t voices, Isa isa);
   bool write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v) override;
-  bool become(const Kernel<T>& from) override {
-    this->become_nodes(from);
+  bool copy_from(const Kernel<T>& from) override {
+    this->copy_nodes(from);
     return rails_.is_empty();
   }
-  std::size_t look_along(std::size_t lane, std::size_t guide,
-                         std::span<double> numbers) const override {
-    return rails_.look(lane, guide, numbers);
+  std::size_t read_waveguide(std::size_t lane, std::size_t guide,
+                             std::span<double> numbers) const override {
+    return rails_.read_positions(lane, guide, numbers);
   }
   // For tests, which add up the energy of the waves.
   const Rails<T>& rails() const { return rails_; }

@@ -323,7 +323,7 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
       correct_links(program, s);
     }
     if (has_rails) {
-      RailLoops<V, T>::go_on(program, *state.rails, s);
+      RailLoops<V, T>::advance_waves(program, *state.rails, s);
     }
     if (has_taps) {
       move_taps(program, s);

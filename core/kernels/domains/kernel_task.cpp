@@ -14,7 +14,7 @@ KernelTask<T>::KernelTask(std::unique_ptr<Kernel<T>>& kernel, BlockBuffers<T> bu
       for (Coefficients<T>& coefficients : place->halo.coefficients) {
         coefficients.ramping.reserve(coefficients.is_ramping.size());
       }
-      can_copy_ = place->kernel->become(*kernel_);
+      can_copy_ = place->kernel->copy_from(*kernel_);
     }
   }
 }
@@ -42,7 +42,7 @@ typename KernelTask<T>::Job KernelTask<T>::job_in(Kernel<T>& kernel, BlockBuffer
 template <class T>
 void KernelTask<T>::perform(const Job& job) {
   if (job.from != job.kernel) {
-    job.kernel->become(*job.from);
+    job.kernel->copy_from(*job.from);
   }
   if (!job.copies.empty()) {
     job.kernel->write_nodes(job.copies, job.copied_x, job.copied_v);

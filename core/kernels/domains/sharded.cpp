@@ -162,14 +162,14 @@ bool ShardedKernel<T>::is_near_start(std::size_t lane, double bound) const {
 
 // A copy is as good as the node itself. Nodes that are in no shard are at 0.
 template <class T>
-std::size_t ShardedKernel<T>::look(std::size_t lane, std::span<const std::uint32_t> nodes,
-                                   std::span<double> numbers) const {
+std::size_t ShardedKernel<T>::read_positions(std::size_t lane, std::span<const std::uint32_t> nodes,
+                                             std::span<double> numbers) const {
   write_copies();
-  return look_at(nodes, numbers, [&](std::uint32_t node) {
+  return copy_positions(nodes, numbers, [&](std::uint32_t node) {
     double position = 0.0;
     for (std::size_t i = 0; i < shards_.size(); ++i) {
       if (const auto local = find(shards_[i], node)) {
-        kernels_[i]->look(lane, {&*local, 1}, {&position, 1});
+        kernels_[i]->read_positions(lane, {&*local, 1}, {&position, 1});
         break;
       }
     }

@@ -35,17 +35,17 @@ class ShardedKernel final : public Kernel<T> {
   // The executor must outlive it. All shards' kernels have the same width.
   ShardedKernel(const Program& program, const Shards& form, std::size_t voices, Isa isa);
   void set_state(std::size_t lane, const double* x, const double* v) override;
-  void let_go(std::size_t lane) override {
+  void disable_links(std::size_t lane) override {
     for (const auto& kernel : kernels_) {
-      kernel->let_go(lane);
+      kernel->disable_links(lane);
     }
   }
   bool save(std::size_t lane, double* x, double* v) const override;
   void strike(std::size_t lane, std::span<const std::uint32_t> nodes,
               std::span<const double> changes) override;
   bool is_near_start(std::size_t lane, double bound) const override;
-  std::size_t look(std::size_t lane, std::span<const std::uint32_t> nodes,
-                   std::span<double> numbers) const override;
+  std::size_t read_positions(std::size_t lane, std::span<const std::uint32_t> nodes,
+                             std::span<double> numbers) const override;
 
  private:
   using Kernels = std::vector<std::unique_ptr<Kernel<T>>>;

@@ -122,8 +122,8 @@ bool GridKernel<T>::write_nodes(std::span<const std::uint32_t> nodes, const T* x
 }
 
 template <class T>
-bool GridKernel<T>::become(const Kernel<T>& from) {
-  const auto& other = static_cast<const GridKernel&>(this->become_nodes(from));
+bool GridKernel<T>::copy_from(const Kernel<T>& from) {
+  const auto& other = static_cast<const GridKernel&>(this->copy_nodes(from));
   y_ = other.y_;
   link_force_ = other.link_force_;
   held_ = other.held_;

@@ -57,7 +57,7 @@ class GridKernel final : public NodeKernel<T> {
  public:
   GridKernel(const Program& program, const Grid& grid, std::size_t voices, Isa isa);
   bool write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v) override;
-  bool become(const Kernel<T>& from) override;
+  bool copy_from(const Kernel<T>& from) override;
 
  private:
   void clear(std::size_t lane) override;

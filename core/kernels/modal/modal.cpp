@@ -61,9 +61,9 @@ T norm_of(const std::vector<double>& shape) {
 
 // Lays out the arrays of a kernel, and fills those that are constant.
 template <class T>
-class Furnisher {
+class StateLayout {
  public:
-  Furnisher(const Program& program, const Modes& modes, std::size_t passives, Isa isa, T* memory)
+  StateLayout(const Program& program, const Modes& modes, std::size_t passives, Isa isa, T* memory)
       : program_(program),
         modes_(modes),
         passives_(passives),
@@ -231,8 +231,8 @@ ModalKernel<T>::ModalKernel(const Program& program, const Modes& modes, std::siz
   const std::size_t passives = passive_.size();
   active_.links.reserve(passives);
   active_.clusters.resize(1);
-  numbers_.resize(Furnisher<T>(program, modes, passives, isa, nullptr).furnish(state_));
-  Furnisher<T>(program, modes, passives, isa, numbers_.data()).furnish(state_);
+  numbers_.resize(StateLayout<T>(program, modes, passives, isa, nullptr).furnish(state_));
+  StateLayout<T>(program, modes, passives, isa, numbers_.data()).furnish(state_);
   state_.passive.links = passive_.data();
   state_.passive.active = &active_;
   state_.sweep.rows = rows_.data();
@@ -339,7 +339,7 @@ double ModalKernel<T>::owed(std::size_t listener) const {
 }
 
 template <class T>
-bool ModalKernel<T>::become(const Kernel<T>& from) {
+bool ModalKernel<T>::copy_from(const Kernel<T>& from) {
   const auto& other = static_cast<const ModalKernel&>(from);
   this->coefficients = other.coefficients;
   numbers_ = other.numbers_;
@@ -383,8 +383,8 @@ void ModalKernel<T>::remember_peaks(const Block<T>& block) {
 }
 
 template <class T>
-std::size_t ModalKernel<T>::look(std::size_t, std::span<const std::uint32_t>,
-                                 std::span<double> numbers) const {
+std::size_t ModalKernel<T>::read_positions(std::size_t, std::span<const std::uint32_t>,
+                                           std::span<double> numbers) const {
   if (numbers.size() < modes_.modes) {
     return 0;
   }

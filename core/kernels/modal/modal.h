@@ -28,7 +28,8 @@ inline constexpr std::size_t most_straight = widest_bytes / sizeof(float);
 // end is a place or, numbered on from these, an element of Modes::ends. A listener is a place or,
 // numbered on from these, an output.
 //
-// The numbers that change and are not in arrays stand in a base of their own: become() copies them.
+// The numbers that change and are not in arrays stand in a base of their own: copy_from() copies
+// them.
 
 // Shapes and factors as the form has them, in T. Constant, except that exact modes scale the
 // shapes.
@@ -242,13 +243,13 @@ class ModalKernel final : public Kernel<T> {
   // Uses the norm of the modes' displacement, which bounds that of every mass. The answer may be
   // false too long, never true too early.
   bool is_near_start(std::size_t lane, double bound) const override;
-  std::size_t look(std::size_t lane, std::span<const std::uint32_t> nodes,
-                   std::span<double> numbers) const override;
+  std::size_t read_positions(std::size_t lane, std::span<const std::uint32_t> nodes,
+                             std::span<double> numbers) const override;
   Awake awake() const override;
   // Returns a bound on the error of a listener (a place or, after these, an output) by modes that
   // sleep or have slept.
   double owed(std::size_t listener) const;
-  bool become(const Kernel<T>& from) override;
+  bool copy_from(const Kernel<T>& from) override;
 
  private:
   void play(const Block<T>& block) override;

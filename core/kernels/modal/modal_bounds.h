@@ -85,21 +85,21 @@ bool may_act(const LinkRun& run, const T* coefficients, Range<T> d) {
   for (std::size_t i = 0; i < law.count; ++i) {
     exerts = exerts || (law.is_strength(i) && c(i) != 0);
   }
-  if (!law.lets_go()) {
+  if (!law.can_detach()) {
     return exerts;
   }
   const T reach = c(law.slot(Role::reach));
   return exerts && d.high > -reach && (law.zone == Zone::below || reach > d.low);
 }
 
-inline bool lets_go(Law law) {
-  return facts_of(law).lets_go();
+inline bool can_detach(Law law) {
+  return facts_of(law).can_detach();
 }
 
 // Returns the share of a link's force that remains with a compliance in series. For a curved law
 // its secant is used. Friction has no stiffness and is not reduced.
 template <class T, class ForceLaw>
-T share_of_give(const ForceLaw& law, T d, T give) {
+T compliance_share(const ForceLaw& law, T d, T give) {
   const T stiffness = law.secant(d);
   return give > 0 && stiffness > 0 ? 1 / (1 + give * stiffness) : T(1);
 }

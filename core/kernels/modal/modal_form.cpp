@@ -332,7 +332,7 @@ class ModesFinder {
     }
     const auto kept_of = [&](const Vector& row) { return kept(row * root); };
     const auto start_of = [&](const Vector& row) { return kept(row / root); };
-    Hearing hearing{kept(stiffness), kept(damping), {}, {start_of(q_), start_of(d_)}, {}};
+    ModalResponse hearing{kept(stiffness), kept(damping), {}, {start_of(q_), start_of(d_)}, {}};
     for (const Vector& row : pushed_) {
       hearing.blows.push_back(kept_of(row));
     }
@@ -342,7 +342,7 @@ class ModesFinder {
         hearing.blows.push_back(hearing.listeners.back());
       }
     }
-    const Worth worth = weigh(hearing, left_out_share * modes_.silence);
+    const ModeSelection worth = select_modes(hearing, left_out_share * modes_.silence);
     modes_.of = static_cast<std::uint32_t>(kept_.size());
     modes_.left_out = worth.share;
     modes_.silence -= worth.share;

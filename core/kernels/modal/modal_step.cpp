@@ -307,7 +307,7 @@ struct ModalPlayer {
           const T d = s.ends.x[a] - s.ends.x[b];
           T f = law.force(d, s.ends.v[a] - s.ends.v[b]);
           if (*give > 0) {
-            f *= share_of_give(law, d, *give / coefficient(modes.give_by));
+            f *= compliance_share(law, d, *give / coefficient(modes.give_by));
           }
           acts |= f != 0;
           s.ends.force[a] -= f;
@@ -395,7 +395,7 @@ struct ModalPlayer {
         if (!may_act_within(run, hold.a[i], hold.b[i], first, frames, norm)) {
           continue;
         }
-        if (!lets_go(run.law)) {
+        if (!can_detach(run.law)) {
           return false;
         }
         suspect(hold.a[i], rows);

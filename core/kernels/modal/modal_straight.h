@@ -44,7 +44,7 @@ bool find_straight(const PassiveLink& passive, const laws::LinkState<T>& state,
   const auto c = [&](std::size_t i) { return coefficient[passive.coefficients[i]]; };
   return with_law<T>(passive.law, c, [&](const auto& law) {
     constexpr LawFacts facts = std::remove_cvref_t<decltype(law)>::facts;
-    if constexpr (facts.lets_go()) {
+    if constexpr (facts.can_detach()) {
       link.zone = facts.zone;
       link.reach = c(facts.slot(Role::reach));
       link.before = state.before();

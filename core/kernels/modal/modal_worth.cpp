@@ -52,7 +52,7 @@ struct Advance {
 
 class Scales {
  public:
-  Scales(const Hearing& hearing, double most) : hearing_(hearing), most_(most) {
+  Scales(const ModalResponse& hearing, double most) : hearing_(hearing), most_(most) {
     for (std::size_t i = 0; i < hearing.stiffness.size(); ++i) {
       rings_.push_back(ring_of(hearing.stiffness[i], hearing.damping[i]));
     }
@@ -69,8 +69,8 @@ class Scales {
                  peaks_of(hearing.starts[0], hearing.starts[1]));
   }
 
-  Worth weigh() {
-    Worth worth;
+  ModeSelection select_modes() {
+    ModeSelection worth;
     worth.kept.resize(rings_.size());
     std::iota(worth.kept.begin(), worth.kept.end(), 0u);
     const Row loudness = loudness_of_modes();
@@ -214,7 +214,7 @@ class Scales {
                      [&](std::uint32_t a, std::uint32_t b) { return life[a] > life[b]; });
   }
 
-  const Hearing& hearing_;
+  const ModalResponse& hearing_;
   double most_;
   std::vector<Ring> rings_;  // [mode]
   std::vector<Row> shares_;  // [source at a listener][mode]
@@ -222,8 +222,8 @@ class Scales {
 
 }  // namespace
 
-Worth weigh(const Hearing& hearing, double most) {
-  return Scales(hearing, most).weigh();
+ModeSelection select_modes(const ModalResponse& hearing, double most) {
+  return Scales(hearing, most).select_modes();
 }
 
 }  // namespace ressort::kernels

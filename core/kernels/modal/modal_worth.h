@@ -11,7 +11,7 @@
 namespace ressort::kernels {
 
 // The modes of a part at the start, for masses of 1, and what excites and reads them.
-struct Hearing {
+struct ModalResponse {
   std::vector<double> stiffness;            // [mode] lK
   std::vector<double> damping;              // [mode] lZ
   std::vector<std::vector<double>> blows;   // [source][mode] velocity after a unit impulse
@@ -20,7 +20,7 @@ struct Hearing {
       listeners;  // [listener][mode] displacement per displacement of a mode
 };
 
-struct Worth {
+struct ModeSelection {
   std::vector<std::uint32_t> kept;  // modes, those that are audible longest first
   std::vector<std::uint32_t> left_out;
   // Bound on the error of a listener by the modes that are left out. For one impulse and for the
@@ -33,6 +33,6 @@ struct Worth {
 // Modes that do not ring are kept. Peaks are the largest of some samples of the motion, so they are
 // never overestimated. O(sources * listeners * modes + modes log modes), plus at most about 1e7
 // operations for the peaks.
-Worth weigh(const Hearing& hearing, double most);
+ModeSelection select_modes(const ModalResponse& hearing, double most);
 
 }  // namespace ressort::kernels

@@ -64,9 +64,10 @@ void OversampledKernel<T>::strike(std::size_t lane, std::span<const std::uint32_
 }
 
 template <class T>
-std::size_t OversampledKernel<T>::look(std::size_t lane, std::span<const std::uint32_t> nodes,
-                                       std::span<double> numbers) const {
-  return fine_->look(lane, nodes, numbers);
+std::size_t OversampledKernel<T>::read_positions(std::size_t lane,
+                                                 std::span<const std::uint32_t> nodes,
+                                                 std::span<double> numbers) const {
+  return fine_->read_positions(lane, nodes, numbers);
 }
 
 template <class T>

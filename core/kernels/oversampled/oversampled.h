@@ -19,8 +19,8 @@ class OversampledKernel final : public Kernel<T> {
   void strike(std::size_t lane, std::span<const std::uint32_t> nodes,
               std::span<const double> changes) override;
   bool is_near_start(std::size_t lane, double bound) const override;
-  std::size_t look(std::size_t lane, std::span<const std::uint32_t> nodes,
-                   std::span<double> numbers) const override;
+  std::size_t read_positions(std::size_t lane, std::span<const std::uint32_t> nodes,
+                             std::span<double> numbers) const override;
   Awake awake() const override { return fine_->awake(); }
 
  private:

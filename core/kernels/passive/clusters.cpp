@@ -43,7 +43,7 @@ std::vector<PassiveLink> passive_links_of(const Program& program) {
                        .coefficients = run.coefficients,
                        .ends = program.ends[i],
                        .zone = law.zone,
-                       .reach = law.lets_go() ? run.coefficients[law.slot(Role::reach)] : 0});
+                       .reach = law.can_detach() ? run.coefficients[law.slot(Role::reach)] : 0});
     }
   }
   return links;

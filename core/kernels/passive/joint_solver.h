@@ -97,29 +97,29 @@ class Joint {
         is_first_(body.awake() == V{}) {}
 
   void solve() {
-    set_out();
+    set_start();
     Lanes live = evaluate(V{} == V{});
     const Lanes lost = live & is_lost_;
     if (any_of(lost)) {
-      set_out_one_by_one(lost);
+      restart_one_by_one(lost);
       evaluate(lost);
     }
     if (any_of(live)) {
-      live = go_by_newton(live);
+      live = iterate_newton(live);
     }
     const Lanes astray = live & fails(is_first_);
     if (any_of(astray)) {
-      set_out_from_rest(astray);
+      restart_from_rest(astray);
       evaluate(astray);
       // Includes lanes where nothing moves and so no energy is produced.
       is_far_ = is_far_ | astray;
-      live = (live & is_first_) | go_by_newton(astray);
+      live = (live & is_first_) | iterate_newton(astray);
     }
     if (any_of(is_first_)) {
       live = live | (is_first_ & makes_energy());
     }
     if (any_of(live & is_lost_)) {
-      set_out_from_rest(live & is_lost_);
+      restart_from_rest(live & is_lost_);
     }
     if (any_of(live)) {
       stiffen(live);
@@ -153,7 +153,7 @@ class Joint {
 
   // Starting point: the forces of the previous sample, plus known changes. Links without a force,
   // and those whose law has several solutions, start from their solution alone.
-  void set_out() {
+  void set_start() {
     for (std::size_t i = 0; i < count_; ++i) {
       const LinkState<V> state = state_of(i);
       Joined<V>& link = joined_[i];
@@ -239,7 +239,7 @@ class Joint {
   // Second starting point, for lanes where Newton's method fails, for example in the sample after a
   // hard impact: from zero forces, one link after the other takes its solution alone (nonlinear
   // Gauss-Seidel), which decreases the objective at every step.
-  void set_out_one_by_one(Lanes lost) {
+  void restart_one_by_one(Lanes lost) {
     space_.rest(lost);
     for (std::size_t i = 0; i < count_; ++i) {
       const V force = select(lost & fails(is_first_), alone(i), V{});
@@ -252,7 +252,7 @@ class Joint {
   // Third starting point, after an impact too hard for the second: from a state where hardly
   // anything moves, with every link held equally. The forces there are limited so that the masses'
   // inertia is not lost to rounding.
-  void set_out_from_rest(Lanes lost) {
+  void restart_from_rest(Lanes lost) {
     constexpr auto hold = static_cast<Scalar<V>>(sizeof(Scalar<V>) == 4 ? 0x1p10 : 0x1p24);
     for (std::size_t i = 0; i < count_; ++i) {
       Joined<V>& link = joined_[i];
@@ -264,7 +264,7 @@ class Joint {
       link.slope = hold * stiffness_to_hold(i);
       link.value = link.slope * link.step;
     }
-    go_at_once(lost);
+    take_full_step(lost);
   }
   // Returns the stiffness that holds a link, relative to the response of its ends.
   V stiffness_to_hold(std::size_t i) const {
@@ -272,12 +272,12 @@ class Joint {
     return 1 / select(give > V{}, give, V{} + 1);
   }
   // Takes one full step with the current `value` and `slope`.
-  void go_at_once(Lanes live) {
+  void take_full_step(Lanes live) {
     space_.solve(joined_, true);
     for (std::size_t i = 0; i < count_; ++i) {
       joined_[i].way = joined_[i].newton_way;
       joined_[i].push = joined_[i].newton_push;
-      go_on(joined_[i], live, V{} + 1);
+      move_along(joined_[i], live, V{} + 1);
     }
     move(live);
   }
@@ -290,7 +290,7 @@ class Joint {
   }
 
   // Iterates Newton's method; returns the lanes that have not converged.
-  Lanes go_by_newton(Lanes live) {
+  Lanes iterate_newton(Lanes live) {
     const V one = V{} + 1;
     const V steepest = V{} - Scalar<V>(1e30);
     V last = steepest;  // Initial slope of the objective along the direction.
@@ -323,7 +323,7 @@ class Joint {
       space_.turn(is_beyond);
       falls += space_.inertia_along(joined_);
       for (std::size_t i = 0; i < count_; ++i) {
-        moves = moves | go_on(joined_[i], live, go);
+        moves = moves | move_along(joined_[i], live, go);
       }
       last = select(is_beyond, last, falls);
       share = select(is_beyond, share + go, one);
@@ -340,7 +340,7 @@ class Joint {
 
   // Moves by a share of the direction. Returns the lanes in which that changes more than the last
   // digit.
-  Lanes go_on(Joined<V>& link, Lanes live, V share) {
+  Lanes move_along(Joined<V>& link, Lanes live, V share) {
     link.force = select(live, link.force + share * link.push, link.force);
     return absolute(link.way) > tiny_share<V>() / 2 * (absolute(link.before) + absolute(link.step));
   }
@@ -364,7 +364,7 @@ class Joint {
         link.value = select(is_first_, memory_[i * passive_rows + 2] + held * from_start(link),
                             rest + link.slope * link.step);
       }
-      go_at_once(live);
+      take_full_step(live);
       live = live & makes_energy();
     }
   }

@@ -68,8 +68,8 @@ static inline bool may_act(const PassiveTables& tables, const Cluster& cluster, 
   return false;
 }
 template <class V, class Body>
-static inline void let_go(const PassiveTables& tables, const Cluster& cluster, V* memory,
-                          Body& body) {
+static inline void clear_forces(const PassiveTables& tables, const Cluster& cluster, V* memory,
+                                Body& body) {
   for (std::size_t i = cluster.first; i < cluster.first + cluster.count; ++i) {
     memory[i * passive_rows + 2] = V{};
     body.push(tables.links[i].ends, V{});
@@ -120,7 +120,7 @@ static inline void correct(const PassiveTables& tables, V* memory, V* numbers, B
   JointOf<V, Body> joint(body);
   for (const Cluster& cluster : tables.clusters) {
     if (!is_first && !may_act(tables, cluster, memory, body)) {
-      let_go(tables, cluster, memory, body);
+      clear_forces(tables, cluster, memory, body);
       continue;
     }
     JointSolver<V>::solve(tables.links, cluster, memory + cluster.first * passive_rows, numbers,

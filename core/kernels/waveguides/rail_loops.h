@@ -71,7 +71,7 @@ struct RailLoops {
 
   // Adds the effect of all forces to the waves and advances by one sample.
   template <class S>
-  static void go_on(const Program& program, Rails<T>& rails, const S& s) {
+  static void advance_waves(const Program& program, Rails<T>& rails, const S& s) {
     const JunctionSlot* const place = program.junctions.data();
     V* wave = row(rails.goes, 0) + rails.done;
     for (std::size_t i = 0, count = rails.gives.size(); i < count; ++i) {

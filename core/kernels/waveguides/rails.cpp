@@ -207,7 +207,8 @@ bool Rails<T>::is_quiet(std::size_t lane, double bound) const {
 }
 
 template <class T>
-std::size_t Rails<T>::look(std::size_t lane, std::size_t number, std::span<double> numbers) const {
+std::size_t Rails<T>::read_positions(std::size_t lane, std::size_t number,
+                                     std::span<double> numbers) const {
   if (number >= guides.size() || numbers.size() < 2) {
     return 0;
   }

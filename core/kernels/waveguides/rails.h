@@ -57,7 +57,7 @@ class Rails {
   // Computes the displacement from the left end at equidistant points, by summing the left-going
   // minus the right-going waves. The filters' delay is distributed over the length. Returns the
   // number of points. O(samples + numbers) [audio]
-  std::size_t look(std::size_t lane, std::size_t guide, std::span<double> numbers) const;
+  std::size_t read_positions(std::size_t lane, std::size_t guide, std::span<double> numbers) const;
   // Returns the energy of the waves in a lane for the current impedances, cross-fades excluded.
   double energy(std::size_t lane, const T* coefficients) const;
 

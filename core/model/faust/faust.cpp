@@ -160,7 +160,7 @@ bool exerts_at_start(const Network& network, const Link& link, const LawFacts& l
   const Start a = start_of(network, link.a);
   const Start b = start_of(network, link.b);
   const Start start{a.position - b.position, a.speed - b.speed};
-  if (!law.lets_go()) {
+  if (!law.can_detach()) {
     return start.position != 0.0 || start.speed != 0.0;
   }
   const std::vector<double> parameters = parameter_values(network);

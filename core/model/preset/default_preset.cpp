@@ -15,7 +15,7 @@ bool never_moves(const Mass& mass) {
 }
 
 bool is_pluck(const LawFacts& law) {
-  return law.lets_go() && !law.is_one_sided();
+  return law.can_detach() && !law.is_one_sided();
 }
 bool is_bow(const LawFacts& law) {
   return law.is_friction;

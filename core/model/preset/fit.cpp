@@ -92,7 +92,8 @@ std::optional<Touch> touch_of(const Network& network, std::size_t input) {
   const std::uint32_t hand = network.inputs[input].mass;
   for (const Link& link : network.links) {
     const LawFacts& facts = facts_of(link.law);
-    if (network.inputs[input].is_force || !facts.lets_go() || (link.a != hand && link.b != hand)) {
+    if (network.inputs[input].is_force || !facts.can_detach() ||
+        (link.a != hand && link.b != hand)) {
       continue;
     }
     const double reach =

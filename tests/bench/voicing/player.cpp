@@ -78,7 +78,7 @@ void Player::reset() {
   run({{0.0, {.kind = EventKind::panic}}}, 0.1, nullptr);
 }
 
-Stereo Player::go_on(double seconds) {
+Stereo Player::continue_playing(double seconds) {
   Stereo sound{.channels = {}, .rate_hz = rate_hz_};
   run({}, seconds, &sound);
   return sound;

@@ -31,7 +31,7 @@ class Player {
   // Plays from silence, with the parameters of the preset and without input signals. The events are
   // sorted by time.
   Stereo play(const std::vector<TimedEvent>& events, double seconds);
-  Stereo go_on(double seconds);  // Continues with the voices that sound.
+  Stereo continue_playing(double seconds);  // Continues with the voices that sound.
   // Returns the share of one core that all voices with one note each take.
   double real_time_share(double seconds);
 

@@ -228,7 +228,7 @@ int play_random_settings(Player& player, const std::string& name, int count, std
     // A preset without damper must ring out by itself.
     for (double more_s = preset.damper_s > 0.0 ? 0.0 : undamped_after_s;
          left_db() > silence_db && more_s > 0.0; more_s -= 2.0) {
-      sound = player.go_on(2.0);
+      sound = player.continue_playing(2.0);
     }
     expect(left_db() <= silence_db, "does not end", left_db());
     failures += is_wrong ? 1 : 0;

@@ -26,9 +26,10 @@ Program formed(const std::string& text) {
 
 // Enough kernels for the voices, each voice at its own pitch and with its own inputs.
 template <class T>
-class Choir {
+class ManyVoices {
  public:
-  Choir(const Program& program, std::size_t voices, Isa isa) : program_(program), voices_(voices) {
+  ManyVoices(const Program& program, std::size_t voices, Isa isa)
+      : program_(program), voices_(voices) {
     while (kernels_.size() * width_ < voices) {
       kernels_.push_back(make_kernel<T>(program_, voices, isa));
       width_ = kernels_[0]->width();
@@ -118,7 +119,7 @@ class Choir {
   Aligned<T> outputs_;
 };
 
-struct Contest {
+struct VoiceTestOptions {
   std::size_t voices = 1;
   std::size_t frames = 2000;
   double reach = 0.02;
@@ -128,11 +129,11 @@ struct Contest {
 
 // Returns one Comparison for each voice, against the direct kernel in double.
 template <class T>
-std::vector<Comparison> contest(const Program& program, const Contest& options) {
+std::vector<Comparison> compare_voices(const Program& program, const VoiceTestOptions& options) {
   Program plain = program;
   plain.form = Form();
-  Choir<double> reference(plain, options.voices, Isa::base);
-  Choir<T> found(program, options.voices, options.isa);
+  ManyVoices<double> reference(plain, options.voices, Isa::base);
+  ManyVoices<T> found(program, options.voices, options.isa);
   const auto hands = [&](std::size_t n, std::size_t voice, std::size_t input) {
     const InputSlot& slot = program.inputs[input];
     const double t = static_cast<double>(n) / 44100.0 * (slot.is_force ? 3000.0 : 90.0);
@@ -165,12 +166,12 @@ std::vector<Comparison> contest(const Program& program, const Contest& options) 
 }
 
 template <class T>
-void check(const Program& program, Contest options, double most_relative) {
+void check(const Program& program, VoiceTestOptions options, double most_relative) {
   for (const Isa isa : isas()) {
     for (const std::size_t voices : {1u, 3u, 5u, 16u, 64u}) {
       options.voices = voices;
       options.isa = isa;
-      const auto heard = contest<T>(program, options);
+      const auto heard = compare_voices<T>(program, options);
       for (std::size_t voice = 0; voice < voices; ++voice) {
         INFO(isa_name(isa) << ", " << voice << " of " << voices << " voices: residual "
                            << show(heard[voice].relative()));
@@ -277,7 +278,7 @@ TEST_CASE("bodies of every size with any laws match the direct kernel", "[batch]
   for (std::uint64_t seed = 1; seed <= 27; ++seed) {
     const std::string text = random_body(seed, 1 + seed % 9);
     INFO("seed " << seed << "\n" << text);
-    const auto heard = contest<double>(formed(text), {.voices = 5, .turns = true});
+    const auto heard = compare_voices<double>(formed(text), {.voices = 5, .turns = true});
     for (const Comparison& voice : heard) {
       INFO("residual " << show(voice.relative()));
       CHECK(voice.relative() < 1e-12);
@@ -308,9 +309,9 @@ TEST_CASE("hard contacts are passive in every voice", "[batch]") {
     for (const Isa isa : isas()) {
       for (const std::size_t voices : {1, 13}) {
         CAPTURE(masses, isa_name(isa), voices);
-        const Contest options{
+        const VoiceTestOptions options{
             .voices = voices, .frames = 300, .reach = 0.03, .turns = true, .isa = isa};
-        for (const Comparison& voice : contest<double>(program, options)) {
+        for (const Comparison& voice : compare_voices<double>(program, options)) {
           CAPTURE(show(voice.relative()));
           CHECK(voice.peak > 1e-3);
           CHECK(voice.relative() < 1e-11);
@@ -322,8 +323,8 @@ TEST_CASE("hard contacts are passive in every voice", "[batch]") {
 
 TEST_CASE("a reset of one lane does not affect the others", "[batch]") {
   const Program program = formed(example("PolyTriangle"));
-  Choir<double> choir(program, 16, best_isa());
-  Choir<double> other(program, 16, best_isa());
+  ManyVoices<double> choir(program, 16, best_isa());
+  ManyVoices<double> other(program, 16, best_isa());
   const auto push = [](std::size_t n, std::size_t, std::size_t) { return n < 9 ? 0.1 : 0.0; };
   choir.play(0, 64, push);
   other.play(0, 64, push);
@@ -349,8 +350,8 @@ TEST_CASE("a common input row equals the same row in each voice", "[batch]") {
   for (std::size_t i = 0; i < programs.size(); ++i) {
     for (const Isa isa : isas()) {
       for (const std::size_t voices : {3u, 20u, 68u}) {
-        Choir<double> choir(programs[i], voices, isa);
-        Choir<double> one(programs[i], voices, isa);
+        ManyVoices<double> choir(programs[i], voices, isa);
+        ManyVoices<double> one(programs[i], voices, isa);
         REQUIRE(one.of(0).takes_common_inputs());
         one.play_as_one();
         const auto hands = [](std::size_t n, std::size_t, std::size_t input) {
@@ -373,8 +374,8 @@ TEST_CASE("unused lanes do not change the other voices", "[batch]") {
   for (const char* const name : {"PolyTriangle", "IPlayTheTriangle", "PhysicalLFO"}) {
     const Program program = formed(example(name));
     for (const Isa isa : isas()) {
-      Choir<double> choir(program, 68, isa);
-      Choir<double> other(program, 68, isa);
+      ManyVoices<double> choir(program, 68, isa);
+      ManyVoices<double> other(program, 68, isa);
       const auto push = [](std::size_t n, std::size_t k, std::size_t) {
         return n % 50 < k ? 0.01 : 0.0;
       };

@@ -77,8 +77,8 @@ std::string mesh_scene() {
 template <class T>
 std::vector<Comparison> compare(const Program& whole, const Program& cut, Isa isa, bool turns) {
   const DenormalsFlushed flushed;  // as in the executor's threads
-  Fighter<T> expected(whole, 1.0, isa);
-  Fighter<T> found(cut, 1.0, isa);
+  KernelRunner<T> expected(whole, 1.0, isa);
+  KernelRunner<T> found(cut, 1.0, isa);
   Random random(3);
   std::vector<Motion> motions;
   for (std::size_t i = 0; i < whole.inputs.size(); ++i) {
@@ -259,7 +259,7 @@ TEST_CASE("a wave passes from one shard to the next unchanged", "[halo]") {
       program_of(scenes::string("s", 600, "1", "0") +
                  "@in1 frcInput @s_m200\n@out1 posOutput @s_m300\n@out2 posOutput @s_m400\n");
   const auto played = [&](Program playing) {
-    Fighter<double> fighter(playing, 1.0, Isa::base);
+    KernelRunner<double> fighter(playing, 1.0, Isa::base);
     std::vector<double> heard;
     for (std::size_t block = 0; block < 4; ++block) {
       std::vector<std::vector<double>> inputs(64, {0.0});
@@ -295,8 +295,8 @@ TEST_CASE("shards do not drift", "[halo]") {
                                "@in1 frcInput @s_m20\n@out1 posOutput @s_m1700\n");
   Program cut = sharded(program, {2, 64}, executor, as_chains);
   program.form = *chains_form(program);
-  Fighter<double> whole(program, 1.0, best_isa());
-  Fighter<double> shards(cut, 1.0, best_isa());
+  KernelRunner<double> whole(program, 1.0, best_isa());
+  KernelRunner<double> shards(cut, 1.0, best_isa());
   Comparison last_second;
   for (std::size_t block = 0; block < 6900; ++block) {
     std::vector<std::vector<double>> inputs(64, {0.0});
@@ -361,8 +361,8 @@ TEST_CASE("one core steps a network in shards if it exceeds the caches", "[halo]
   CHECK(wide->shards->size() == 10);  // in shards of at most 1 MiB
   Program whole = machine.parts[0];
   whole.form = *chains_form(whole);
-  Fighter<double> together(whole, 1.0, best_isa());
-  Fighter<double> apart(cut, 1.0, best_isa());
+  KernelRunner<double> together(whole, 1.0, best_isa());
+  KernelRunner<double> apart(cut, 1.0, best_isa());
   Comparison comparison;
   for (std::size_t block = 0; block < 8; ++block) {
     std::vector<std::vector<double>> inputs(64, {0.0});

@@ -9,8 +9,8 @@
 namespace ressort::modes_asleep_test {
 namespace {
 
-using support::Fighter;
 using support::isas;
+using support::KernelRunner;
 using support::network_of;
 using support::show;
 
@@ -102,9 +102,9 @@ class Pair {
   double owed(std::size_t output) const { return kernel().owed(form().places.size() + output); }
 
   Program program_;
-  Fighter<T> sleepy_;
-  Fighter<T> full_;
-  Fighter<T> unreduced_;
+  KernelRunner<T> sleepy_;
+  KernelRunner<T> full_;
+  KernelRunner<T> unreduced_;
   std::size_t frames_ = 0;
   double sum_awake_ = 0.0;
   double peak_ = 0.0;
@@ -243,8 +243,8 @@ TEST_CASE("Exact modes sleep, too", "[modes_asleep]") {
   Program sleepy = full;
   full.form = *modal_form(full, {.cents = 1.0});
   sleepy.form = *modal_form(sleepy, {.cents = 1.0, .silence_db = -60.0});
-  Fighter<double> one(full, 1.0, best_isa());
-  Fighter<double> other(sleepy, 1.0, best_isa());
+  KernelRunner<double> one(full, 1.0, best_isa());
+  KernelRunner<double> other(sleepy, 1.0, best_isa());
   const double reach = reach_of_a_blow(text);
   double sum = 0.0;
   for (std::size_t at = 0; at < 44100; at += 60) {

@@ -9,8 +9,8 @@ namespace ressort::modes_exact_test {
 namespace {
 
 using support::Comparison;
-using support::Fighter;
 using support::isas;
+using support::KernelRunner;
 using support::network_of;
 using support::show;
 
@@ -29,7 +29,7 @@ Program in_modes(const std::string& text, const Budget& budget) {
 template <class T>
 std::vector<std::vector<double>> let_ring(const Program& program, std::size_t frames,
                                           Isa isa = best_isa()) {
-  Fighter<T> fighter(program, 1.0, isa);
+  KernelRunner<T> fighter(program, 1.0, isa);
   const std::vector<double> rest(program.inputs.size(), 0.0);
   std::vector<std::vector<double>> heard(program.outputs.size());
   for (std::size_t at = 0; at < frames; at += 60) {
@@ -178,7 +178,7 @@ TEST_CASE("Exact modes are as accurate in float as the published scheme", "[mode
 TEST_CASE("A constant force moves exact modes to the static deflection", "[modes_exact]") {
   const std::string text =
       scenes::string("s", 5, "0.8", "0.2") + "@in1 frcInput @s_m2\n" + scenes::output(1, "s_m2");
-  Fighter<double> fighter(in_modes(text, physical), 1.0, best_isa());
+  KernelRunner<double> fighter(in_modes(text, physical), 1.0, best_isa());
   std::vector<double> heard;
   for (int i = 0; i < 100; ++i) {
     heard = fighter.play(std::vector<std::vector<double>>(60, {0.3}));
@@ -218,7 +218,7 @@ TEST_CASE("Exact modes follow a changing stiffness", "[modes_exact]") {
                            std::string("@in1 frcInput @a\n@out1 posOutput @a\n");
   const auto play = [&](const Budget& budget) {
     const Program program = in_modes(text, budget);
-    Fighter<double> fighter(program, 1.0, best_isa());
+    KernelRunner<double> fighter(program, 1.0, best_isa());
     std::vector<double> heard;
     for (std::size_t at = 0; at < frames; at += 60) {
       if (at == from) {
@@ -265,7 +265,7 @@ TEST_CASE("The errors of the published scheme match theory", "[modes_exact]") {
   const auto of = [](const std::string& stiffness, const std::string& damping) {
     const Program program = support::program_of(scenes::string("s", 50, stiffness, damping) +
                                                 scenes::output(1, "s_m9"));
-    return Judge(program, {{program.parameters, 1.0}}, patient_modes).of(Form());
+    return AccuracyMeter(program, {{program.parameters, 1.0}}, patient_modes).of(Form());
   };
   // The highest mode of such a string is off by 31.7 cents and 0.2 %: its K is 0.4 cos^2(pi/102),
   // so its frequency is 2 asin(sqrt(K)/2) instead of sqrt(K - Z^2/4).

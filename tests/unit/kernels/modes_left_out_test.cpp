@@ -14,7 +14,7 @@ double factor_at(const ModalShare& share, std::size_t mode) {
              : 0.0;
 }
 
-using support::Fighter;
+using support::KernelRunner;
 using support::network_of;
 using support::Random;
 using support::RandomNetwork;
@@ -135,8 +135,8 @@ void check_network(const Program& program, double silence_db, Random& random, Ta
   const auto inputs = blows(program, random, frames);
   const Swings swings = swings_of(program, *full);
   const std::vector<double> sums = sums_of(program, *full, inputs);
-  Fighter<double> one(whole, 1.0, best_isa());
-  Fighter<double> other(part, 1.0, best_isa());
+  KernelRunner<double> one(whole, 1.0, best_isa());
+  KernelRunner<double> other(part, 1.0, best_isa());
   const auto& kernel = dynamic_cast<const ModalKernel<double>&>(other.kernel());
   std::vector<double> asleep(full->outputs.size(), 0.0);
   bool has_slept = false;
@@ -253,7 +253,7 @@ Program shortened(const Program& program, std::uint32_t count, bool gives) {
 }
 
 std::vector<double> heard_of(const Program& program, std::size_t frames) {
-  Fighter<double> fighter(program, 1.0, best_isa());
+  KernelRunner<double> fighter(program, 1.0, best_isa());
   std::vector<double> heard;
   for (std::size_t at = 0; at < frames; at += 44) {
     const auto some = fighter.play(std::vector<std::vector<double>>(44));

@@ -8,9 +8,9 @@ namespace {
 
 using support::check_same;
 using support::ComparisonOptions;
-using support::Fighter;
 using support::in_modes;
 using support::isas;
+using support::KernelRunner;
 using support::show;
 
 constexpr double pi = std::numbers::pi;
@@ -146,7 +146,7 @@ TEST_CASE("Hard contacts on modes gain no energy in a million samples", "[modes_
   for (const Budget& budget : {Budget{}, Budget{.cents = 1e-6}}) {
     const Program program = in_modes(Lossless().text(), Passivity::always, budget);
     const bool is_exact = program.form.get<Modes>().is_exact;
-    Fighter<double> fighter(program, 1.0, best_isa());
+    KernelRunner<double> fighter(program, 1.0, best_isa());
     const std::vector<std::vector<double>> nobody(64);
     std::vector<double> last;
     double first_energy = 0.0;
@@ -191,8 +191,8 @@ TEST_CASE("Modes sleep while no passive link touches, and wake when one does", "
   Modes all_awake = awake.form.get<Modes>();
   all_awake.silence = 0.0;
   awake.form = std::move(all_awake);
-  Fighter<double> one(sleepy, 1.0, best_isa());
-  Fighter<double> other(awake, 1.0, best_isa());
+  KernelRunner<double> one(sleepy, 1.0, best_isa());
+  KernelRunner<double> other(awake, 1.0, best_isa());
   double worst = 0.0;
   double peak = 0.0;
   double modes = 0.0;
@@ -280,7 +280,7 @@ TEST_CASE("The compliance of omitted modes acts on passive links, too", "[modes_
     }
     program.form = modes;
     const auto rest = [&](double finger, double force) {
-      Fighter<double> fighter(program, 1.0, best_isa());
+      KernelRunner<double> fighter(program, 1.0, best_isa());
       std::vector<double> heard;
       for (std::size_t at = 0; at < 20'000; at += 50) {
         const double done = std::min(1.0, static_cast<double>(at) / 10'000.0);

@@ -218,7 +218,7 @@ TEST_CASE("no law exerts a force beyond its reach", "[laws]") {
             : facts.zone == Zone::below ? -reach - past
                                         : d;
         v = facts.zone == Zone::slow ? side * (reach + past) : v;
-        CHECK(facts.gap(values, d) >= (facts.lets_go() ? past - 1e-12 : 0.0));
+        CHECK(facts.gap(values, d) >= (facts.can_detach() ? past - 1e-12 : 0.0));
       }
       CHECK(law_with<decltype(type)>(values).force(d, v) == 0.0);
     }

@@ -88,7 +88,7 @@ TEST_CASE("the drawing matches the render for every kernel", "[panel]") {
           player.run(64);
           player.run(1000 + 37, {note_on(0, 69)}, {256, 37});
           MotionFrame frame;
-          frame.count = player.engine().look(frame.numbers);
+          frame.count = player.engine().read_positions(frame.numbers);
           std::vector<float> positions(picture.masses.size());
           find_positions(picture, frame, positions);
           INFO(scene.name << " by " << method_name(method));
@@ -123,7 +123,7 @@ TEST_CASE("a large network is drawn in part", "[panel]") {
   CHECK(picture.masses.size() <= most_dots);
   player.run(200, {note_on(0, 69)});
   MotionFrame frame;
-  frame.count = player.engine().look(frame.numbers);
+  frame.count = player.engine().read_positions(frame.numbers);
   CHECK(frame.count == picture.masses.size());
 }
 
@@ -170,7 +170,7 @@ TEST_CASE("a waveguide's drawing matches its displacement", "[panel]") {
       drawn.run(97);
       heard.run(97);
       MotionFrame frame;
-      frame.count = drawn.engine().look(frame.numbers);
+      frame.count = drawn.engine().read_positions(frame.numbers);
       std::vector<float> positions(picture.masses.size());
       find_positions(picture, frame, positions);
       const auto here = [&](double u) {

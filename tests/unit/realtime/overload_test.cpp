@@ -91,7 +91,7 @@ Played played(std::size_t blocks, double fixed, double each) {
   Played result;
   for (std::size_t n = 0; n < blocks; ++n) {
     load.add((fixed + each * result.last) * period_s, period_s);
-    if (const auto voices = load.judge(result.last, keys)) {
+    if (const auto voices = load.update_limit(result.last, keys)) {
       ++result.changes;
       result.last = *voices;
       result.least = std::min(result.least, result.last);
@@ -206,7 +206,7 @@ TEST_CASE("after a second of low load more voices may sound, by their cost", "[o
     std::optional<int> said;
     for (std::size_t n = 0; n < blocks; ++n) {
       load.add(share * period_s, period_s);
-      if (const auto voices = load.judge(sounding, 64)) {
+      if (const auto voices = load.update_limit(sounding, 64)) {
         CHECK_FALSE(said);
         said = voices;
       }
