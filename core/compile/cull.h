@@ -20,7 +20,8 @@ template <class Counts, class Meet>
 void join_places(const Network& network, Groups& groups, const Progress& progress, Counts&& counts,
                  Meet&& meet) {
   std::vector<bool> is_joined(network.masses.size(), false);  // [first node] of a macro
-  std::vector<std::uint32_t> first(network.waveguides.size(), no_argument);  // place of each
+  std::vector<std::uint32_t> first(network.waveguides.size(),
+                                   no_argument);  // [waveguide] its first place
   std::map<std::uint32_t, std::uint32_t> macros;  // macro -> its first place
   for (std::uint32_t i = 0; i < network.masses.size(); ++i) {
     if (network.masses[i].kind == MassKind::junction && counts(i)) {

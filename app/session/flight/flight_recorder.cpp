@@ -60,8 +60,8 @@ std::optional<std::string> FlightRecorder::collect(const Meters& now) {
   save_time_ = time;
   ++saved_;
   const auto saved = save((has_reset ? "runaway-" : "xruns-") + time_stamp());
-  return saved ? "the flight until now is saved as " + *saved
-               : "the flight until now could not be saved: " + saved.error().message;
+  return saved ? "the flight so far is saved as " + *saved
+               : "the flight so far could not be saved: " + saved.error().message;
 }
 
 Result<std::string> FlightRecorder::write(const std::string& path, Existing existing) {

@@ -148,7 +148,7 @@ class WebStep {
   const PassiveLink* links_;
   std::size_t ends_;
   V* rows_;
-  V* give_;      // [end]
+  V* give_;      // [end] compliance
   V* straight_;  // Linear force on each end, proportional to distances and speeds.
   V* bent_;      // Nonlinear force -grad P.
   CoefficientView<V> coefficients_;

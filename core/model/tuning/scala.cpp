@@ -193,8 +193,8 @@ Result<std::vector<double>> key_frequencies(const Scale& scale, const KeyboardMa
   };
   const auto reference = cents_of_key(map.reference_key);
   if (!reference) {
-    return Error{"the keyboard map gives the frequency of key " +
-                 std::to_string(map.reference_key) + ", which it leaves silent"};
+    return Error{"the keyboard map sets the pitch at key " + std::to_string(map.reference_key) +
+                 ", which it makes silent"};
   }
   std::vector<double> frequencies;
   for (int key = 0; key < 128; ++key) {

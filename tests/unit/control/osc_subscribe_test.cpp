@@ -144,7 +144,8 @@ TEST_CASE("an OSC error is logged locally, too", "[osc_subscribe]") {
   CHECK(has(osc.news, "OSC: /nowhere: unknown address"));
 }
 
-TEST_CASE("an integer velocity is MIDI's, a float is a share", "[osc_subscribe]") {
+TEST_CASE("an integer velocity is a MIDI velocity, a float a fraction of full velocity",
+          "[osc_subscribe]") {
   OscHarness osc;
   const auto current = osc.harness.session.current();
   const auto velocity = [&](double number, const std::string& types) {

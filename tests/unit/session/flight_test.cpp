@@ -234,7 +234,7 @@ TEST_CASE("A flight of a program that shares the notes plays its own part", "[fl
   CHECK(sounds[1] != sounds[2]);
 }
 
-TEST_CASE("A flight has the texts of the time when they were played", "[flight]") {
+TEST_CASE("A flight contains the texts as they were when they were played", "[flight]") {
   const Folder folder;
   const std::string model =
       "@K param 0.1\n@s ground 0.\n@m mass 1. 0. 0.\n@r springDamper @s @m K 0.0005\n"

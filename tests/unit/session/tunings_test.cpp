@@ -60,7 +60,7 @@ TEST_CASE("a missing or invalid tuning is reported with its file and line", "[tu
   CHECK(has(error_of(folder.write("b.toml", preset("scale = \"bad.scl\""))),
             bad + ":4:1: error: expected note 2 of 2"));
   CHECK(has(error_of(folder.write("c.toml", preset("keyboard_map = \"map.kbm\""))),
-            "map.kbm: the keyboard map gives the frequency of key 61, which it leaves silent"));
+            "map.kbm: the keyboard map sets the pitch at key 61, which it makes silent"));
   CHECK(has(error_of(folder.write("d.toml", preset("scale = \"../bad.scl\""))), "d.toml:2:"));
   CHECK(has(error_of(folder.write("e.toml", preset("scale = \"bad.txt\""))),
             "'scale' must be the name of a .scl file beside the preset"));
