@@ -101,7 +101,7 @@ class LinePrinter {
   std::condition_variable wake_;
   std::condition_variable idle_;
   std::deque<std::pair<int, std::string>> lines_;
-  std::size_t bytes_ = 0;  // of `lines_`
+  std::size_t bytes_ = 0;  // total size of `lines_`
   std::size_t left_out_ = 0;
   bool is_silent_ = false;
 };

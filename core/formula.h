@@ -32,8 +32,8 @@ enum class Op : std::uint8_t {
 
 struct Step {
   Op op = Op::number;
-  std::uint32_t index = 0;  // for Op::parameter
-  double value = 0.0;       // for Op::number
+  std::uint32_t index = 0;  // operand of Op::parameter
+  double value = 0.0;       // operand of Op::number
   bool operator==(const Step&) const = default;
 };
 

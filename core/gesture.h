@@ -32,7 +32,7 @@ enum class Gesture : std::uint8_t {
 // An argument of a live call: a number or a text.
 struct CallArgument {
   std::string_view word = {};     // placeholder in help texts
-  std::string_view meaning = {};  // in errors: "the strength must lie between 0 and 1"
+  std::string_view meaning = {};  // name in errors: "the strength must lie between 0 and 1"
   double least = -std::numeric_limits<double>::infinity();
   double most = std::numeric_limits<double>::infinity();
   std::optional<double> otherwise = {};      // default; nullopt: the argument is required

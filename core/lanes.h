@@ -147,7 +147,7 @@ static inline bool any_of(Mask mask) {
   }
 }
 
-inline constexpr std::size_t widest_bytes = 64;  // of any pack
+inline constexpr std::size_t widest_bytes = 64;  // size of the widest pack
 
 // Allocates on cache lines, so that every pack is aligned.
 template <class T>

@@ -28,7 +28,7 @@ struct RaisedCosine {
 
   std::size_t count = 1;
   double turn = 2.0 * std::numbers::pi;  // phase increment per sample
-  double sum = 2.0;                      // of 1 - cos over all samples
+  double sum = 2.0;                      // sum of 1 - cos over all samples
 };
 
 }  // namespace ressort

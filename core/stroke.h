@@ -10,7 +10,7 @@ namespace ressort {
 // The settings of a preset's control that a gesture uses.
 struct GestureSettings {
   double low = 0.0;  // the amount 0..1 is mapped to low..high: positions, forces, speeds per sample
-  double high = 1.0;         // at 44 100 Hz, or parameter values
+  double high = 1.0;         // value at 44 100 Hz, or parameter value
   bool exponential = false;  // equal steps are equal ratios
   double travel = 0.0;       // pluck, swing: distance of the finger or mallet from its middle
   bool has_level = false;    // the amount also sets the voice's level, from low_db to high_db
@@ -25,7 +25,7 @@ struct Stroke {
   double second = 0.0;  // second argument of a live call
   bool is_live = false;
   bool has_control = false;  // a live call may have none
-  GestureSettings settings;  // of the preset's control
+  GestureSettings settings;  // settings of the preset's control
   // The input and the voice.
   bool is_force = false;
   double middle = 0.0;      // position of the input in the model; 0 for a force

@@ -35,7 +35,7 @@ inline double order_from_filters(const FiltersAt& filters, double u, bool runs_r
 // Places the filters in the middle of the widest gap between the places that springs hold, whose
 // coordinates are `held`. The delay between two held places is a whole number of samples.
 inline FiltersAt filters_between(const std::vector<double>& held) {
-  std::vector<double> ways;  // from the right end
+  std::vector<double> ways;  // distances from the right end
   for (const double u : held) {
     ways.push_back(0.5 * (1.0 - std::clamp(u, 0.0, 1.0)));
     ways.push_back(1.0 - ways.back());

@@ -50,7 +50,7 @@ json findings_json(const std::vector<Finding>& findings) {
 
 // Results of the stability analysis of a scene.
 struct Proved {
-  Certificate certificate;  // in all of the preset's ranges, or at the model's own values
+  Certificate certificate;  // proof for all of the preset's ranges, or for the model's own values
   double stiffness_factor = 0.0;
   bool is_exact = true;     // false: by a bound
   bool others_move = true;  // the limits hold for all values of the other parameters

@@ -17,7 +17,7 @@
 namespace ressort::commands {
 namespace {
 
-Flag interrupted;  // by a signal, while rendering
+Flag interrupted;  // set by a signal while rendering
 
 std::string db(double factor) {
   if (factor <= 0.0) {

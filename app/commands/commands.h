@@ -18,14 +18,14 @@
 namespace ressort::commands {
 
 struct PlayOptions {
-  std::string name = "IPlayTheTriangle";  // or a MIDI file, played by this preset
+  std::string name = "IPlayTheTriangle";  // preset or model, or a MIDI file, played by this preset
   std::string audio = "auto";             // jack, alsa, dummy, auto
   std::string midi = "auto";              // auto, alsa, jack, none, or a MIDI file
   AudioOptions device;
   double gain_db = 0.0;
   int voices = 0;
   int threads = 1;        // including the audio thread
-  NoteShare::Part share;  // of the notes
+  NoteShare::Part share;  // share of the notes
   Precision precision = Precision::float64;
   bool rescale = true;
   std::optional<Method> method;        // empty: the plan's choice

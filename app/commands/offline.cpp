@@ -30,7 +30,7 @@ constexpr double silent_peak = 1e-4;  // -80 dBFS
 constexpr double longest_s = 24.0 * 3600.0;
 
 // Bytes per node of a macro until its kernel is built, and the largest number of nodes.
-constexpr std::uint64_t bytes_of_node = 700;  // of a mesh; of a string 500
+constexpr std::uint64_t bytes_of_node = 700;  // for a mesh; 500 for a string
 constexpr std::uint64_t most_nodes = 1'000'000'000;
 
 struct ScoredEvent {

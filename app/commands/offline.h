@@ -39,7 +39,7 @@ struct RenderOptions {
   bool limit = false;
   bool force = false;  // renders unstable models
   int voices = 0;
-  int threads = 0;        // for large networks; 0: one per core
+  int threads = 0;        // threads for large networks; 0: one per core
   Progress loading = {};  // until the first sample; fails with `stopped` if it stops
 };
 
@@ -50,11 +50,11 @@ struct Rendered {
   int channels = 0;
   double peak = 0.0;
   double rms = 0.0;
-  double cpu_s = 0.0;  // of this thread, without loading
+  double cpu_s = 0.0;  // CPU time of this thread, without loading
   std::uint64_t resets = 0;
   bool was_interrupted = false;
   std::vector<std::string> warnings;
-  std::optional<Error> failure;  // of the disk; no file is kept
+  std::optional<Error> failure;  // error of the disk; no file is kept
 };
 
 // Renders to the output file. `progress` gets the finished share, 0 before anything is written, and

@@ -20,7 +20,8 @@ namespace ressort::devices {
 namespace {
 
 constexpr int most_audio_inputs = 16;
-constexpr std::size_t most_midi_packets = 4096;  // in one block; more than a port's buffer holds
+// limit for one block; more than a port's buffer holds
+constexpr std::size_t most_midi_packets = 4096;
 
 using Ports = std::unique_ptr<const char*, decltype(&jack_free)>;
 

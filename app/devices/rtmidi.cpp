@@ -50,7 +50,7 @@ struct MidiInput::Sources {
   bool connect;
   MidiSink& door;
   std::unique_ptr<MidiPort> own;                             // the port that others connect to
-  std::map<std::string, std::unique_ptr<MidiPort>> sources;  // by name
+  std::map<std::string, std::unique_ptr<MidiPort>> sources;  // ports by name
 };
 
 MidiInput::MidiInput(std::unique_ptr<Sources> sources) : sources_(std::move(sources)) {}

@@ -25,8 +25,8 @@ std::string row(std::initializer_list<double> values, const std::string& text);
 struct Series {
   std::string style;            // gnuplot's plotting style and its options: "lines lw 2"
   std::string data;             // rows; an empty line starts a new curve
-  std::string title;            // in the key; empty for none
-  std::string columns = "1:2";  // of the data
+  std::string title;            // title in the key; empty for none
+  std::string columns = "1:2";  // columns of the data
   bool is_matrix = false;       // columns 1 and 2 count the columns and rows of the data from 0
 };
 
@@ -63,7 +63,7 @@ struct Panel {
   ColourMap colours = ColourMap::none;
   double lightest = 0.0;  // the ends of the colour map
   double darkest = 1.0;
-  std::string scale_title;          // of the colour scale at the right; empty: no scale
+  std::string scale_title;          // title of the colour scale at the right; empty: no scale
   bool has_room_for_scale = false;  // beside a panel with a colour scale
 };
 

@@ -15,7 +15,7 @@ namespace ressort::realtime {
 class DspLoad {
  public:
   static constexpr std::size_t spans = 5;
-  static constexpr double span_s = 0.005;  // of sound; a longer block is a span
+  static constexpr double span_s = 0.005;  // length of a span of sound; a longer block is a span
   static constexpr double most = 0.9;      // load above which voices are stolen
   static constexpr double wanted = 0.75;   // load that the remaining voices should have
   static constexpr double low = 0.6;  // load below which more voices may sound, after low_s seconds
@@ -44,7 +44,7 @@ class DspLoad {
 
   double mean_ = 0.0;
   double lasting_ = 0.0;
-  double took_s_ = 0.0;  // of the current span
+  double took_s_ = 0.0;  // computing time of the current span
   double sound_s_ = 0.0;
   bool skips_ = false;   // ignore this span: stolen voices still fade in it
   bool is_new_ = false;  // `lasting_` has changed since the last update_limit()

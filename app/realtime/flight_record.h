@@ -19,7 +19,7 @@ struct FlightRecord {
     hurry,   // after this block, the fading engine ends at once
     gap,     // records before this one were lost: the reader was too slow
   };
-  std::int64_t frame = 0;  // of the process's own count
+  std::int64_t frame = 0;  // frame of the process's own count
   Kind kind = Kind::event;
   std::uint32_t count = 0;
   std::uint32_t channels = 0;

@@ -42,7 +42,7 @@ class MidiReader {
   bool next_key_of_octave(Event& event);
   void end_packet();
 
-  std::uint8_t status_ = 0;  // of the current message; kept for running status
+  std::uint8_t status_ = 0;  // status byte of the current message; kept for running status
   std::uint8_t data_[2] = {0, 0};
   int have_ = 0;
   int need_ = 0;

@@ -10,7 +10,7 @@ namespace ressort::realtime {
 
 struct MidiChartRow {
   std::string_view message;
-  std::string_view number;  // or values; empty if there is none
+  std::string_view number;  // number or values; empty if there is none
   bool is_received = true;
   std::string_view does;
 };

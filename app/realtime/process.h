@@ -53,7 +53,7 @@ struct Report {
   Kind kind = Kind::reset;
   std::uint32_t model = 0;  // serial of the model
   std::uint16_t index = 0;  // parameter, or number of voices that there is time for; 0: unlimited
-  double value = 0.0;       // of the parameter, or the load, or 128 * bank + program
+  double value = 0.0;       // value of the parameter, or the load, or 128 * bank + program
 };
 
 // The target of a learned controller. It overrides the preset while the model with this serial
@@ -105,7 +105,7 @@ struct Meters : EngineMeters {
   std::uint64_t malformed = 0;    // unreadable MIDI messages
   std::uint64_t swaps = 0;        // changes of the engine
   std::uint64_t record_lost = 0;  // chunks that the recording lost
-  double peak = 0.0;              // of the output since the last reading, linear
+  double peak = 0.0;              // peak of the output since the last reading, linear
   double limited = 1.0;           // lowest gain of the limiter since the last reading, linear
   std::uint64_t dropped = 0;      // events that found a queue full
   std::uint64_t strangers = 0;    // OSC packets from senders that are not allowed
@@ -118,7 +118,7 @@ struct Meters : EngineMeters {
 
 struct Process {
   static constexpr std::size_t chunk_frames = 512;  // longest block that an engine gets
-  static constexpr std::size_t max_channels = 64;   // of a model
+  static constexpr std::size_t max_channels = 64;   // limit for a model
   static constexpr std::size_t max_now = 4096;      // events of one source in one block
   static constexpr std::size_t max_endings = 1024;  // places kept free for events that end sound
   static constexpr std::size_t max_ahead = 4096;    // events that wait for their frame
@@ -126,7 +126,8 @@ struct Process {
   static constexpr double longest_strobe_s = 0.1;   // longest wait for a frame of the stroboscope
   // the output is kept for this long after a motion frame
   static constexpr double looked_for_s = 1.0;
-  static constexpr double longest_ring_s = 60.0;  // of the model before a program change
+  // longest time that the model before a program change rings
+  static constexpr double longest_ring_s = 60.0;
 
   // A monotonic clock in ns that makes no system call.
   using Clock = std::int64_t (*)();
@@ -238,7 +239,7 @@ struct Process {
   bool limit_;
   Clock clock_ns_;
   DspLoad load_;
-  std::int64_t frame_ = 0;  // of the next sample
+  std::int64_t frame_ = 0;  // frame of the next sample
   std::uint64_t order_ = 0;
   MidiReader midi_;
   PlayingEngine* current_ = nullptr;

@@ -14,9 +14,10 @@ using std::chrono::nanoseconds;
 using std::chrono::steady_clock;
 
 constexpr std::int64_t awake_ns = 100'000;  // a helper polls for work this long after its last task
-constexpr std::int64_t lead_ns = 60'000;    // and before the expected start of a period
+// a helper wakes this long before the expected start of a period
+constexpr std::int64_t lead_ns = 60'000;
 constexpr std::int64_t short_nap_ns = 50'000;
-constexpr std::int64_t long_nap_ns = 5'000'000;  // for helpers that nobody has needed
+constexpr std::int64_t long_nap_ns = 5'000'000;  // nap of helpers that are not needed
 constexpr std::int64_t forgotten_ns = 100'000'000;
 
 // Returns the monotonic clock. Reads shared memory, makes no system call.

@@ -34,7 +34,8 @@ class ThreadPool final : public Executor {
   HazardPointer<Team> shown_;
   AtomicTime next_ns_;       // start of the next period that needs help
   AtomicTime period_ns_;     // 0: unknown
-  std::int64_t frame_ = -1;  // of the newest period; only the thread that shows a team uses it
+  // frame of the newest period; only the thread that shows a team uses it
+  std::int64_t frame_ = -1;
   Counter taken_over_;
   Flag ends_;
   std::vector<std::jthread> threads_;

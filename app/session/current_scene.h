@@ -28,7 +28,7 @@ struct Loaded {
   std::string preset_text;  // empty if the preset was generated
   Instrument instrument;
   Plan plan;
-  double load_ms = 0.0;  // to read, parse and compile it
+  double load_ms = 0.0;  // time to read, parse and compile it
   std::vector<std::string> warnings;
 };
 

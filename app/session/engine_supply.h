@@ -43,7 +43,7 @@ class EngineSupply {
   PictureOf picture_of_;
   std::function<void(int)> prepare_inputs_;
   std::uint32_t serial_ = 0;
-  std::uint32_t count_ = 0;  // of engines so far
+  std::uint32_t count_ = 0;  // number of engines so far
   const Engine* newest_ = nullptr;
 };
 

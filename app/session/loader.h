@@ -65,7 +65,7 @@ TuningReading read_tuning(const std::string& scale, const std::string& keyboard_
 struct SceneOptions {
   bool bare = false;                   // the model without a preset and without a generated one
   std::optional<ThirdArgument> third;  // overrides preset and model
-  Reach reach = Reach::any_file;       // of the name, and of the preset's model
+  Reach reach = Reach::any_file;       // reach of the name and of the preset's model
   KeyOptions keys = {};
   const std::vector<SceneFile>* files = nullptr;  // used instead of the disk, by their paths
   std::uint64_t most_nodes = max_macro_nodes;     // limit for the model's macros
@@ -80,8 +80,8 @@ struct ModelText {
 };
 
 struct Scene {
-  std::string name;  // for people: "PolyTriangle"
-  std::string path;  // of the requested file
+  std::string name;  // name for messages: "PolyTriangle"
+  std::string path;  // path of the requested file
   std::string model_path;
   std::vector<ModelText> texts;  // files of the model
   Network network;

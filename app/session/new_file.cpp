@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int most_links = 40;       // the kernel's limit
-constexpr int most_leftovers = 100;  // from killed programs
+constexpr int most_leftovers = 100;  // temporary files left by killed programs
 
 Error cannot_write(const std::string& path) {
   return {"'" + path + "' cannot be written: " + std::generic_category().message(errno)};

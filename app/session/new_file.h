@@ -30,8 +30,8 @@ class NewFile {
  private:
   NewFile() = default;
 
-  std::string path_;     // as requested
-  std::string place_;    // with links resolved
+  std::string path_;     // path as requested
+  std::string place_;    // path with links resolved
   std::string written_;  // temporary name; empty for devices and pipes
   Existing existing_ = Existing::refuse;
   int descriptor_ = -1;

@@ -26,13 +26,13 @@ struct Recorder::Work {
   std::string path;
   Existing existing = Existing::refuse;
   std::optional<SoundWriter> file;
-  double rate_hz = unknown_rate_hz;  // of the file
+  double rate_hz = unknown_rate_hz;  // sample rate of the file
   int channels = 2;
   std::uint64_t frames = 0;       // frames written
   std::uint64_t lost_before = 0;  // Meters::record_lost at the start
   std::uint64_t unfit = 0;        // chunks with another number of channels
   std::optional<Error> failure;   // ends the recording
-  std::vector<float> samples;     // of one round, written together
+  std::vector<float> samples;     // samples of one round, written together
 
   std::mutex mutex;
   std::condition_variable wake;

@@ -82,7 +82,7 @@ class SceneBuilder {
   SceneWatch& watch_;
   std::optional<Improvable> improvable_;
   Wisdom wisdom_{options_.wisdom_path};
-  Timings recalled_{.time = {},  // of earlier measurements
+  Timings recalled_{.time = {},  // results of earlier measurements
                     .recall = [this](const std::string& key) { return wisdom_.recall(key); },
                     .keep = {}};
   Timings timings_{.time = options_.time,  // the same, and of new ones

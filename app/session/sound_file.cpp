@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 
 struct Kind {
   std::string_view ending;
-  int form;               // of libsndfile
+  int form;               // format number of libsndfile
   std::string_view mark;  // first bytes of a file
   bool holds_floats;
   bool ends_at_4_gb;
@@ -40,7 +40,8 @@ constexpr Kind kinds[] = {
     {".au", SF_FORMAT_AU, ".snd", true, true, true},
     {".caf", SF_FORMAT_CAF, "caff", true, false, true},
 };
-constexpr double most_bytes = 4294967295.0 - 1048576.0;  // of samples; the rest is for the header
+// size of all samples; the rest is for the header
+constexpr double most_bytes = 4294967295.0 - 1048576.0;
 constexpr std::chrono::milliseconds header_age{500};     // interval of header updates
 
 const Kind* kind_of(const std::string& path) {

@@ -27,7 +27,7 @@ class SoundReader {
 
   double rate_hz() const;
   std::size_t channels() const;
-  long long frames() const;  // from the header; negative: unknown
+  long long frames() const;  // length from the header; negative: unknown
   // Reads the next frames, interleaved. Returns their number, which is smaller at the end.
   std::size_t read(double* interleaved, std::size_t frames);
 

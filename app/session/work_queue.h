@@ -83,8 +83,8 @@ class WorkQueue {
   std::deque<LoadJob> loads_;
   std::deque<Inquiry> inquiries_;
   bool is_ending_ = false;
-  double rate_hz_;        // of the backend
-  double built_rate_hz_;  // of the playing scene, or of the last attempt
+  double rate_hz_;        // rate of the backend
+  double built_rate_hz_;  // rate of the playing scene, or of the last attempt
 };
 
 }  // namespace ressort::session

@@ -46,7 +46,7 @@ BudgetRegion make_budget_region(const CompileRequest& request, const Analysis& a
 // factor.
 double wanted_factor(const CompileRequest& request, const Mode& mode, double stable) {
   constexpr int highest_of_a_piano = 108;
-  constexpr double highest_share = 0.45;  // of the sample rate
+  constexpr double highest_share = 0.45;  // fraction of the sample rate
   int highest = 0;
   for (const ControlSetting& control : request.preset.controls) {
     if (control.source == ControlSource::note) {
@@ -205,7 +205,7 @@ Result<Compiled> compile_by_stages(const CompileRequest& request) {
     playing.share = options.share;
     return playing;
   };
-  std::optional<double> factor = 1.0;  // on the preset's gain
+  std::optional<double> factor = 1.0;  // factor on the preset's gain
   if (options.find_gain) {
     progress.stage("finding its gain");
     factor =

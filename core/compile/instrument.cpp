@@ -106,7 +106,7 @@ double find_blow(const Network& network, const std::vector<Control>& controls, d
   }
   const std::vector<double> parameters = parameter_values(network);
   double mass = 0.0;
-  double modal_mass = 0.0;  // of a body: each of its modes has this mass
+  double modal_mass = 0.0;  // mass of each mode of a body
   for (const Mass& of : network.masses) {
     const double here = moves(of) ? argument_value(network, of.mass, parameters) : 0.0;
     modal_mass = of.is_mode ? std::max(modal_mass, here) : modal_mass;

@@ -22,7 +22,7 @@ struct TunedKeys;
 struct InputInfo {
   int number = 1;
   bool is_force = false;
-  std::vector<Gesture> gestures;  // of the preset's controls
+  std::vector<Gesture> gestures;  // gestures of the preset's controls
   std::string attached_to;        // name of the mass that it moves or pushes
   bool knows(Gesture gesture) const {
     return std::find(gestures.begin(), gestures.end(), gesture) != gestures.end();
@@ -62,7 +62,7 @@ struct Instrument {
   std::optional<Mode> mode;  // lowest mode, with its sounding frequency; nothing: keys are untuned
   double highest_frequency_hz = 0.0;  // higher keys are silent; 0: untuned
   double stiffness_margin = 0.0;      // proved factor on every stiffness; below 1: unproved
-  Verdict verdict = Verdict::stable;  // of everything but contacts, over all ranges
+  Verdict verdict = Verdict::stable;  // verdict on everything but contacts, over all ranges
 };
 
 // Returns whether the ranges of any control are in swings, multiples of the displacement of a loud

@@ -69,7 +69,7 @@ std::optional<double> find_gain(const Machine& machine, const Playing& playing, 
   constexpr double most_steps_of_block = 4e6;
   // Passive links are solved together by Newton's method.
   constexpr double steps_of_shared_link = 200.0;
-  double steps = 1.0;                             // of a sample
+  double steps = 1.0;  // steps per sample
   double at_worst = 1.0;
   for (const Program& program : machine.parts) {
     at_worst += worst_steps(program);

@@ -28,7 +28,8 @@ struct CompileOptions {
   std::optional<Budget> budget;  // replaces the preset's
   Isa isa = best_isa();          // no wider than the machine's
   std::uint32_t most_modes = patient_modes;  // masses of a part up to which modes are computed
-  const Timings* timings = nullptr;          // for the plan; null: the same forms on every machine
+  // measurements for the plan; null: the same forms on every machine
+  const Timings* timings = nullptr;
   std::vector<std::string> forms;  // forms of an earlier plan, which is repeated; see Choice
   Executor* executor = nullptr;              // helper threads; outlives the engine; null: none
   bool find_gain = false;         // choose the gain so that a forte note peaks at -6 dBFS
@@ -40,7 +41,7 @@ struct CompileOptions {
 };
 
 struct CompileRequest {
-  const Network& written;  // with its macros
+  const Network& written;  // network with its macros
   const Preset& preset;
   const CompileOptions& options;
   Budget budget = options.budget.value_or(preset.budget);

@@ -361,7 +361,7 @@ class Chooser {
   Budget budget_;                  // without the limits that the published scheme keeps
   AccuracyMeter* meter_ = nullptr;  // null: the published scheme is accurate enough
   Accuracy spent_;
-  Accuracy accuracy_;      // of the chosen form
+  Accuracy accuracy_;      // error of the chosen form
   std::string published_;  // the error of the published scheme, if it is too large
   bool may_gain_ = false;
   bool is_untimed_ = false;

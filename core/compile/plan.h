@@ -44,7 +44,7 @@ struct Part {
 struct Plan {
   std::vector<Part> parts;
   Budget budget;
-  std::optional<Accuracy> accuracy;  // of the worst part, including the error of merging
+  std::optional<Accuracy> accuracy;  // error of the worst part, including merging
   // notes on everything that is not computed as the model is written
   std::vector<std::string> notes;
 };
@@ -63,7 +63,7 @@ struct Planned {
 struct BudgetRegion {
   std::vector<double> lowest;  // [parameter]; empty: no parameter moves
   std::vector<double> highest;
-  double highest_factor = 1.0;  // of the highest key
+  double highest_factor = 1.0;  // stiffness factor of the highest key
   Accuracy merged;
 };
 

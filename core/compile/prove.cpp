@@ -18,7 +18,7 @@ std::vector<std::optional<RestBound>> make_rest_bounds(const Network& network,
                                                        const ParameterBox& box,
                                                        const Progress& progress) {
   std::vector<std::optional<RestBound>> bounds(machine.parts.size());
-  std::map<std::uint32_t, double> compliance_of;  // by mass
+  std::map<std::uint32_t, double> compliance_of;  // keyed by mass
   for (const Output& output : network.outputs) {
     compliance_of[output.mass] = 0.0;
   }

@@ -13,7 +13,7 @@
 namespace ressort::compile {
 
 struct Proof {
-  StabilityCheck stability;  // at the start values and over the parameters' ranges
+  StabilityCheck stability;  // proof at the start values and over the parameters' ranges
   Margins margins;           // factors on every stiffness that keys may use
   std::vector<std::optional<RestBound>> rest_bounds;  // [part]; empty: no part is ever frozen
 };

@@ -13,7 +13,7 @@
 namespace ressort::compile {
 namespace {
 
-constexpr std::size_t most_sum_steps = 64;  // of a formula that is the sum of two
+constexpr std::size_t most_sum_steps = 64;  // largest formula that is the sum of two
 
 // A spring and a parallel one, which adds its stiffness and damping to the first.
 struct ParallelPair {

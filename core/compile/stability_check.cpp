@@ -16,7 +16,7 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t most_quick_work = 10'000'000;  // parameters times links
 constexpr double unbounded = 1e12;                   // stands for infinity in interval arithmetic
-constexpr double keys_share = 0.98;  // of the margin: modes at the limit hardly decay
+constexpr double keys_share = 0.98;  // fraction of the margin: modes at the limit hardly decay
 
 double finite(double value) {
   return std::clamp(value, -unbounded, unbounded);
@@ -294,7 +294,7 @@ class StabilityChecker {
       if (std::min(inside, outside) < 0.0 && std::max(inside, outside) > 0.0 && holds_to(0.0)) {
         inside = 0.0;
       }
-      constexpr int halvings = 120;  // from 1e12 to the last digit of a small number
+      constexpr int halvings = 120;  // enough from 1e12 to the last digit of a small number
       for (int n = 0; n < halvings; ++n) {
         const double middle = std::midpoint(inside, outside);
         (holds_to(middle) ? inside : outside) = middle;
@@ -380,7 +380,7 @@ class StabilityChecker {
   Stability stability_;
   StabilityCheck result_;
   ParameterBox asked_;                                // requested values
-  ParameterBox wanted_;                               // those that make no stiffness negative
+  ParameterBox wanted_;                               // values that make no stiffness negative
   ParameterBox box_;                                  // proved values
   std::vector<std::optional<SourceLocation>> place_;  // [parameter] line of its range in the preset
 };
@@ -504,7 +504,7 @@ ParameterBox proved_box(const StabilityCheck& check, const Preset& preset) {
 Margins find_margins(const Network& network, std::span<const LinkScheme> schemes,
                      const ParameterBox& box, std::span<const Limits> limits, double rate_ratio,
                      const Progress& progress) {
-  Network inside = network;  // with parameter values in the box
+  Network inside = network;  // network with parameter values in the box
   for (std::size_t i = 0; i < inside.parameters.size(); ++i) {
     double& value = inside.parameters[i].value;
     value = std::clamp(value, box.lowest[i], box.highest[i]);

@@ -25,7 +25,7 @@ inline constexpr std::size_t most_quick_masses = 256;
 // A parameter as the user sees it: its name, its value in its own unit and its range.
 struct ParameterInfo {
   std::string name;
-  double value = 0.0;  // at the start
+  double value = 0.0;  // value at the start
   double minimum = 0.0;
   double maximum = 0.0;
   int audio_input = 0;  // channel that sets it, sample by sample; 0: none
@@ -58,7 +58,7 @@ struct StabilityRequest {
   const Network& written;   // its elements are named in errors
   const Network& expanded;  // the same network without macros
   const Preset& preset;
-  const std::vector<ParameterInfo>& parameters;  // from requested_ranges()
+  const std::vector<ParameterInfo>& parameters;  // result of requested_ranges()
   std::span<const LinkScheme> schemes;           // [link] empty: all as published
   std::span<const double> start;                 // [parameter] from start_values()
   double rate_hz = 44100.0;
@@ -71,9 +71,9 @@ struct StabilityRequest {
 
 struct StabilityCheck {
   Network proved;  // the written network without passive links: the subject of the proof
-  Verdict verdict = Verdict::stable;      // at the start values
+  Verdict verdict = Verdict::stable;      // verdict at the start values
   std::optional<Error> complaint;         // unless stable: error at the model's line
-  std::vector<ParameterInfo> parameters;  // with the narrowed ranges
+  std::vector<ParameterInfo> parameters;  // parameters with the narrowed ranges
   std::vector<Error> narrowed;            // ranges of the preset that are too wide, at its lines
   std::vector<Limits> limits;             // [parameter] enforced limits; infinite: none
   bool is_together = false;               // all ranges were narrowed by the same share
@@ -90,7 +90,7 @@ ParameterBox proved_box(const StabilityCheck& check, const Preset& preset);
 // Factors on every stiffness up to which the network stays stable. Plucks, bows and contacts count
 // as if they were always closed.
 struct Margins {
-  double whole = 0.0;        // with parameters anywhere in the box; below 1: unproved
+  double whole = 0.0;        // factor with parameters anywhere in the box; below 1: unproved
   double keys = 0.0;         // the share of it that keys may use
   std::vector<Limits> home;  // [parameter] the box, on those sides where a limit lies beyond it
   std::vector<double> away;  // `keys` at equal steps from the box to the limits

@@ -12,7 +12,8 @@
 namespace ressort::compile {
 namespace {
 
-constexpr double highest_mode_share = 0.456;  // of the sample rate; higher modes are not played
+// fraction of the sample rate; higher modes are not played
+constexpr double highest_mode_share = 0.456;
 
 struct FoundPitches {
   Pitches pitches;
@@ -77,7 +78,7 @@ std::optional<PitchesAlong> range_to_tune(const CompileRequest& request, const N
 // within 0.01 cents of the pitches halfway, or up to 64 steps. Empty if a mode is missing anywhere.
 PitchesAlong find_pitches_along(const CompileRequest& request, const Network& network,
                                 const Machine& machine) {
-  constexpr double in_tune = 1e-5;  // of a logarithm of the factor: 0.01 cents
+  constexpr double in_tune = 1e-5;  // difference of the logarithm of the factor: 0.01 cents
   constexpr std::size_t most_steps = 64;
   std::optional<PitchesAlong> along = range_to_tune(request, network);
   if (!along) {

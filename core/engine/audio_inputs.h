@@ -34,7 +34,7 @@ class AudioInputs {
     const Control* control = nullptr;  // null: no audio drives the input
     double scale = 1.0;
     double before = 0.0;              // last scaled sample
-    const double* samples = nullptr;  // this segment; null: silent
+    const double* samples = nullptr;  // samples of this segment; null: silent
   };
   std::size_t count_adjacent(const Program& program, std::size_t first, std::size_t most) const;
   static const double* channel_of(const Driven& input, const Segment& segment);

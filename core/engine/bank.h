@@ -29,7 +29,8 @@ struct PartBank {
     last.resize(kernels.size() * row());
   }
   T* last_of(std::size_t voice) { return last.data() + voice / width * row(); }
-  std::size_t row() const { return program.outputs.size() * width; }  // of one kernel
+  // size of an output row of one kernel
+  std::size_t row() const { return program.outputs.size() * width; }
   Kernel<T>& of(std::size_t voice) { return *kernels[voice / width]; }
   const Kernel<T>& of(std::size_t voice) const { return *kernels[voice / width]; }
 

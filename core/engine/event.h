@@ -14,7 +14,7 @@ enum class EventKind : std::uint8_t {
   note_off,      // index: key, value: release velocity 0..1
   controller,    // index: MIDI controller number, value: 0..1
   program,       // index: MIDI program number; handled by the loader, ignored by engines
-  pressure,      // of the channel, value: 0..1
+  pressure,      // pressure of the channel, value: 0..1
   key_pressure,  // index: key, value: 0..1
   bend,          // value: -1..1, times the bend range
   custom,        // index: row of the control map (an OSC address of the preset), value: 0..1
@@ -34,7 +34,7 @@ inline constexpr double usual_release_velocity = 0.5;
 struct Event {
   std::uint32_t frame = 0;  // within the block
   EventKind kind = EventKind::panic;
-  Gesture gesture = Gesture::position;  // for EventKind::gesture
+  Gesture gesture = Gesture::position;  // gesture of EventKind::gesture
   std::uint8_t channel = 0;             // MIDI channel 0..15, or note_channel() of a note's ID
   std::uint16_t index = 0;
   std::uint32_t model = 0;  // serial number of the model that `index` refers to; 0: any

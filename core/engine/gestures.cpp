@@ -276,7 +276,7 @@ void Gestures::fill_inputs(Bank<T>& bank, const VoiceGroup& group, std::size_t f
   if (!row_state.is_any_moving) {
     return;
   }
-  const std::size_t step = part.program.inputs.size() * part.width;  // from frame to frame
+  const std::size_t step = part.program.inputs.size() * part.width;  // distance from frame to frame
   for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {
     const InputSlot& slot = part.program.inputs[i];
     for (std::size_t lane = group.first; lane < group.end; ++lane) {

@@ -58,7 +58,7 @@ class Gestures {
 
   // Writes the drivers' positions before a segment to bank.row.
   struct RowState {
-    bool is_any_moving = false;  // in an awake voice
+    bool is_any_moving = false;  // motion in an awake voice
     bool is_uniform = true;      // nothing moves, and all lanes have the same positions
   };
   template <class T>

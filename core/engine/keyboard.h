@@ -88,7 +88,7 @@ class Keyboard {
   void release(Voice& voice) const;
   // Damps a voice that no key has started, like one whose key is released.
   void damp_keyless(Voice& voice) const;
-  void forget_keys(ChannelMask channels);  // as if none were held
+  void forget_keys(ChannelMask channels);  // the keys count as not held
   // Fades all voices, and lifts all pedals and keys.
   void panic();
   void silence(std::uint8_t channel);

@@ -41,7 +41,7 @@ class Mixing {
                     std::size_t from, const double* outputs) const;
 
   double gain_;
-  double bound_;  // of an output before gains; a voice beyond it is unstable
+  double bound_;  // largest output before gains; a voice beyond it is unstable
   std::uint64_t noise_ = 0x9e3779b97f4a7c15u;
 };
 

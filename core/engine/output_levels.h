@@ -28,11 +28,11 @@ class OutputLevels {
 
  private:
   struct Level {
-    std::uint32_t output = 0;  // of the part
+    std::uint32_t output = 0;  // output of the part
     double now = 1.0;
     double step = 0.0;  // per frame of the ramp
     double target = 1.0;
-    std::size_t frames = 0;  // left of the ramp
+    std::size_t frames = 0;  // frames left of the ramp
     double after(std::size_t n) const {
       return n < frames ? now + step * static_cast<double>(n) : target;
     }

@@ -49,7 +49,7 @@ struct PitchesAlong {
   double highest = 2.0;
   bool by_ratios = false;
   std::size_t legs = 1;
-  std::size_t steps = least_steps;  // in a leg
+  std::size_t steps = least_steps;  // steps in a leg
   std::vector<Pitches> at;          // empty: keys are tuned at the parameters' initial values
 };
 

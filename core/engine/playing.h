@@ -49,7 +49,7 @@ struct Limits {
 struct RestBound {
   struct Reach {
     std::uint32_t link = 0;   // a contact or a pluck
-    double compliance = 0.0;  // of the distance of its ends
+    double compliance = 0.0;  // compliance of the distance of its ends
   };
   std::vector<double> compliances;  // [output]
   std::vector<Reach> reaches;
@@ -88,7 +88,7 @@ struct Playing {
   bool legato = false;                   // a key pressed while another is held is not struck
   double glide_s = 0.0;                  // portamento time, linear in cents
   NoteShare::Part share;                 // the notes that this engine plays, of several engines
-  Pitches pitches;                       // of the lowest mode
+  Pitches pitches;                       // pitches of the lowest mode
   PitchesAlong along;           // replaces `pitches` where a parameter must leave keys in tune
   double highest_factor = 1.0;  // greatest stiffness factor that is proved stable
   std::vector<Limits> home;     // [parameter] range in which highest_factor holds; empty: anywhere

@@ -30,7 +30,7 @@ struct Decay {
   double fade_step = 0.0;  // subtracted from the gain in each sample of a fade
   double kept = 1.0;       // factor that the damper applies in each sample
   double kept_goal = 1.0;  // target of `kept`, which follows without a step
-  double pole = 0.0;       // of the one-pole filter from `kept` to `kept_goal`
+  double pole = 0.0;       // pole of the filter from `kept` to `kept_goal`
 
   bool is_steady() const { return fade_step == 0.0 && kept == 1.0 && kept_goal == 1.0; }
   void advance() {
@@ -58,9 +58,9 @@ struct alignas(64) Voice {
   bool awake = false;        // computed and mixed
   bool unstable = false;     // out of bounds: frozen at its last sane sample, then faded
   bool fading = false;       // stolen or ended; the lane is free after the fade
-  bool held = false;         // by a key
-  bool sustained = false;    // by a pedal after its key was released
-  bool latched = false;      // by the sostenuto pedal
+  bool held = false;         // held by a key
+  bool sustained = false;    // held by a pedal after its key was released
+  bool latched = false;      // held by the sostenuto pedal
   bool is_new = false;       // its kernels must be reset before they step
   bool is_retuned = false;   // its kernels must be retuned before they step
   bool has_key = false;      // if not, it belongs to every channel
@@ -71,8 +71,8 @@ struct alignas(64) Voice {
   bool has_own_pitch = false;  // given by the note, not by the key
   Decay decay;
   SideGains volume = {1.0, 1.0};  // strength times the channel's level
-  std::size_t volume_frames = 0;  // left of the volume ramp
-  double peak = 0.0;              // of the network's output since the last update
+  std::size_t volume_frames = 0;  // frames left of the volume ramp
+  double peak = 0.0;              // peak of the network's output since the last update
   SideGains volume_step = {};     // per frame of the ramp
   double strength = 1.0;          // gain by velocity
   double level = 0.0;             // output peak with a slow release
@@ -83,7 +83,7 @@ struct alignas(64) Voice {
   double semitones = 0.0;     // its own channel's bend and tuning
   double glide = 0.0;         // semitones left of the glide
   double glide_step = 0.0;    // semitones per max_block_frames
-  double factor = 1.0;        // on every stiffness
+  double factor = 1.0;        // factor on every stiffness
   double release_s = 0.0;     // T60 of its damper, by release velocity
 };
 

@@ -12,7 +12,7 @@ namespace {
 // position, velocity, force and two numbers of the kernel
 constexpr std::uint64_t numbers_of_node = 5;
 constexpr std::uint64_t numbers_of_link = 1;  // per link, if a kernel has one number for all voices
-constexpr std::uint64_t bytes_of_link = 48;   // in tables
+constexpr std::uint64_t bytes_of_link = 48;   // size in tables
 constexpr std::uint64_t numbers_of_coefficient = 3;
 
 }  // namespace

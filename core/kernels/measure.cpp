@@ -18,8 +18,9 @@ namespace {
 
 constexpr std::size_t least_blocks = 3;
 constexpr std::size_t most_blocks = 15;
-constexpr double enough_ns = 3e6;   // for all blocks of one form
-constexpr double most_steps = 1e6;  // of all voices in a sample: larger parts are not measured
+constexpr double enough_ns = 3e6;  // measuring time for all blocks of one form
+// steps of all voices in a sample; larger parts are not measured
+constexpr double most_steps = 1e6;
 
 // A part in one form, with the state and the input of its worst case.
 template <class T>
@@ -128,7 +129,7 @@ class Trial {
     }
   }
 
-  static constexpr double least_overlap = 1e-3;  // of contacts, and the amplitude of the noise
+  static constexpr double least_overlap = 1e-3;  // overlap of contacts, and amplitude of the noise
 
   const Program& program_;
   std::vector<std::unique_ptr<Kernel<T>>> kernels_;

@@ -17,7 +17,7 @@ struct NodeLayout {
   std::vector<std::uint32_t> lane;  // [lane]
   std::size_t row = 0;              // numbers
   std::size_t rows = 3;
-  std::size_t size = 0;  // of all numbers
+  std::size_t size = 0;  // total size in numbers
 };
 
 // Returns a layout of rows [slot][lane]. `slot` has the slot of each node, and a row has `slots`.

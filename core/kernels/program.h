@@ -61,7 +61,8 @@ struct LinkRun {
   Scheme scheme = Scheme::plain;
   std::uint32_t first = 0;
   std::uint32_t count = 0;
-  std::array<std::uint32_t, most_law_arguments> coefficients{};  // of the law's arguments
+  // coefficients of the law's arguments
+  std::array<std::uint32_t, most_law_arguments> coefficients{};
   bool operator==(const LinkRun&) const = default;
 };
 
@@ -79,7 +80,7 @@ struct InputSlot {
 };
 
 struct OutputSlot {
-  std::uint32_t channel = 0;  // from 0
+  std::uint32_t channel = 0;  // channel, from 0
   std::uint32_t node = 0;
   bool is_force =
       false;  // the force of the links and of this sample's inputs, at the reference rate
@@ -91,7 +92,7 @@ struct OutputSlot {
 // A parameter that an audio channel sets in every sample.
 struct AudioParameter {
   std::uint32_t parameter = 0;
-  int channel = 0;  // from 0
+  int channel = 0;  // channel, from 0
   bool operator==(const AudioParameter&) const = default;
 };
 
@@ -100,7 +101,7 @@ struct AudioParameter {
 // nodes are the modes, and the point is between two of `places`, at each of which every mode has a
 // weight.
 struct TapSlot {
-  std::uint32_t node = 0;  // of the point itself
+  std::uint32_t node = 0;  // node of the point itself
   // Its first node in Program::tap_nodes, row by row. If the Program has only the nodes around the
   // point, the index that the first one would have, modulo 2^32.
   std::uint32_t first = 0;
@@ -151,7 +152,7 @@ struct Program {
   std::vector<InputSlot> inputs;
   std::vector<TapSlot> taps;
   std::vector<std::uint32_t> tap_nodes;  // nodes
-  std::vector<double> shapes;            // of bodies
+  std::vector<double> shapes;            // mode shapes of bodies
   std::vector<SampledCoefficients> modes;
   std::vector<WaveguideSlot> waveguides;
   std::vector<JunctionSlot> junctions;
@@ -176,9 +177,9 @@ static inline bool is_junction(const Program& program, std::uint32_t node) {
 
 // An input of the model, which may drive several parts.
 struct ModelInput {
-  int number = 1;  // from 1, as in the model
+  int number = 1;  // number in the model, from 1
   bool is_force = false;
-  double position = 0.0;  // at the start; 0 for a force
+  double position = 0.0;  // position at the start; 0 for a force
   bool operator==(const ModelInput&) const = default;
 };
 

@@ -78,7 +78,7 @@ constexpr KernelRow rows[] = {
     row<Oversampled, OversampledKernel>(
         Method::oversampled, "oversampled", Use::physical,
         [](const Request& r) {
-          constexpr std::uint32_t times = 4;  // for --method oversampled
+          constexpr std::uint32_t times = 4;  // steps per sample of --method oversampled
           return r.program.moving > 0 && r.program.modes.empty()
                      ? std::optional(oversampled_form(oversampled_program(r.program, times), times))
                      : std::nullopt;

@@ -39,7 +39,7 @@ struct KernelRow {
     given,  // divides other forms among several cores; has no name of its own
   };
 
-  Form::Kind kind;  // of its tables
+  Form::Kind kind;  // type of its tables
   Method method;  // the method, or of a divided form the method of its parts
   std::string_view name;
   Use use;

@@ -70,7 +70,7 @@ struct LawWord {
   std::string_view word;
   int least = 0;  // fewest and most arguments
   int most = 0;
-  std::string_view arguments;  // for messages
+  std::string_view arguments;  // description for messages
   int first = 0;               // index of the law's argument that comes first in the line
   int printed = 0;        // number of arguments up to which the printer uses this word; 0: never
   std::string_view tail;  // printed after the arguments
@@ -89,10 +89,10 @@ enum class Zone : std::uint8_t {
 };
 
 struct LawFacts {
-  std::string_view name;  // in FAUST
-  std::string_view one;   // in messages
+  std::string_view name;  // name in FAUST
+  std::string_view one;   // name in messages
   std::string_view many;
-  std::size_t count = 0;  // of arguments
+  std::size_t count = 0;  // number of arguments
   std::array<LawArgument, most_law_arguments> arguments{};
   std::array<LawWord, most_law_words> words{};  // examples use the first; unused ones are empty
   Zone zone = Zone::everywhere;
@@ -106,7 +106,7 @@ struct LawFacts {
   bool is_straight =
       false;              // a spring and a damper wherever it acts; the law has a function `inside`
   bool is_convex = true;  // the force never falls with d or v
-  double solve_operations = 0.0;  // of one discrete gradient, roughly; ranks the kernels
+  double solve_operations = 0.0;  // rough cost of one discrete gradient; ranks the kernels
   // FAUST definitions, one after the other. The arguments come first, as coefficients at the sample
   // rate of the program. The quantities are those of discrete_gradient.h.
   //   NAME(arguments, d, v) = the published force

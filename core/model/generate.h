@@ -33,7 +33,7 @@ struct Shape {
   double second_stiffness = 0.05;  // K2, stiff strings only
   double damping = 0.001;
   double air_damping = 0.0;  // if above 0, every moving point is an osc with this damping
-  double position = 0.0;     // of every point, at rest
+  double position = 0.0;     // position of every point, at rest
   bool as_macro = false;     // write one line; not for triangles and hexagons
   bool with_io = true;       // add @in1 (force), @out1 (position), and a ground if there is none
 };

@@ -258,7 +258,7 @@ class Morphing {
       }
     }
     std::vector<Output> outputs;
-    std::vector<std::pair<std::uint32_t, std::size_t>> taps;  // and the places that they get
+    std::vector<std::pair<std::uint32_t, std::size_t>> taps;  // points and the places that they get
     taps.emplace_back(out_.masses[*driven].tap, 0);
     for (const Output& output : out_.outputs) {
       if (!is_on_body(output.mass)) {

@@ -13,10 +13,10 @@ namespace ressort::model {
 
 // A stop of a morph.
 struct MorphStop {
-  std::string name;            // for messages
-  const Network* network;      // with the same structure as all others
+  std::string name;            // name for messages
+  const Network* network;      // network with the same structure as all others
   std::vector<double> values;  // [parameter] values
-  double gain = 1.0;           // of its outputs
+  double gain = 1.0;           // gain of its outputs
 };
 
 // Returns a network with the structure, names, lines and drawings of `base`. It equals the first

@@ -97,11 +97,11 @@ struct Macro {
   ArgumentId air_damping = no_argument;  // Zo
   // Waveguides only, which have no nodes:
   ArgumentId impedance = no_argument;     // R, force per velocity
-  ArgumentId frequency_hz = no_argument;  // of the lowest partial
-  ArgumentId t60_s = no_argument;         // of the lowest partial
+  ArgumentId frequency_hz = no_argument;  // frequency of the lowest partial
+  ArgumentId t60_s = no_argument;         // T60 of the lowest partial
   ArgumentId brightness = no_argument;    // 0..1
   std::vector<std::string> places;        // names, bodies only
-  double position = 0.0;                  // of every node
+  double position = 0.0;                  // position of every node
   double third = 0.0;                     // see Mass
   std::uint32_t drawing = 0;
   bool is_fixed = false;  // keys do not change its stiffness
@@ -202,9 +202,9 @@ struct Network {
   std::vector<Mass> masses;  // grounds and position inputs too, in the order of the text
   std::vector<Macro> macros;
   std::vector<BodyMode> modes;    // sorted by body
-  std::vector<Macro> waveguides;  // of an expanded network; they have no nodes
+  std::vector<Macro> waveguides;  // waveguides of an expanded network; they have no nodes
   std::vector<Tap> taps;
-  std::vector<double> shapes;  // of expanded bodies; see Tap
+  std::vector<double> shapes;  // mode shapes of expanded bodies; see Tap
   std::vector<Link> links;
   std::vector<Input> inputs;    // sorted by number
   std::vector<Output> outputs;  // sorted by number

@@ -67,7 +67,7 @@ EXPORT void bench_compute(void* it, int frames, void* inputs, void* outputs) {
 )";
 
 struct Option {
-  const char* name;  // in files
+  const char* name;  // name in files
   const char* shown;
   const char* faust;
 };
@@ -94,7 +94,7 @@ Outcome outcome_of(const std::string& command) {
 
 // A program, by its file name without extension.
 struct Source {
-  const char* prefix;  // in printed names
+  const char* prefix;  // prefix in printed names
   bool is_export;
   fs::path base;
 };

@@ -13,7 +13,7 @@ namespace ressort::bench {
 
 // A compiled FAUST program, loaded until this process ends. `is_double` is its precision.
 struct FaustLibrary {
-  std::string variant;  // for people: "-vec clang++"
+  std::string variant;  // name for tables: "-vec clang++"
   bool is_double = true;
   bool is_default = false;  // without an option, by g++
   void* (*make)(int rate_hz) = nullptr;

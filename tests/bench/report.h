@@ -19,14 +19,14 @@ struct Row {
   std::size_t masses = 0;  // moving masses of one voice
   std::size_t links = 0;
   std::size_t voices = 1;
-  bool is_worst = false;  // of the scene
+  bool is_worst = false;   // whether the scene is a worst case
   double median_ns = 0.0;  // per sample
   double minimum_ns = 0.0;
   double lower_ns = 0.0;  // quartiles of the rounds
   double upper_ns = 0.0;
   // Ratios of medians: how many times faster this row is than others in the same run.
   std::optional<double> than_reference;
-  std::optional<double> than_best_faust;  // in the same precision
+  std::optional<double> than_best_faust;  // the same for the best of FAUST in the same precision
   std::optional<double> than_default_faust;
   // Ratio of the time that the multiply-adds alone would take at the core's peak rate to the
   // measured time.

@@ -21,8 +21,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t frames = 2000;
-constexpr std::size_t channels = 7;  // of the input; the most that a model uses
-constexpr double tolerance = 1e-9;   // of each channel's peak
+constexpr std::size_t channels = 7;  // channels of the input; the most that a model uses
+constexpr double tolerance = 1e-9;   // fraction of each channel's peak
 
 // The program around all compiled exports: `runner NAME RATE IN OUT [PARAMETER VALUE]` runs one of
 // them over raw interleaved doubles.

@@ -19,7 +19,7 @@ struct BodyOptions {
   bool as_json = false;
   std::size_t most_modes = 400;
   double floor_db = -70.0;  // energy of the weakest mode, relative to the strongest
-  double mass = 40.0;       // of every mode
+  double mass = 40.0;       // mass of every mode
 };
 
 // Options for models.

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double floor_db = -110.0;
 constexpr double lowest_hz = 20.0;
-constexpr double pixels = 1600.0;  // of a spectrum
+constexpr double pixels = 1600.0;  // points of a spectrum
 
 // Root of the power of all channels in each bin, over the first `size` samples, a power of two.
 std::vector<double> magnitudes(const std::vector<std::vector<double>>& channels, std::size_t size) {

@@ -9,7 +9,7 @@ namespace ressort::commands {
 namespace {
 
 constexpr std::size_t most_modes = 12;
-constexpr std::size_t most_triangles = 60'000;  // of the whole figure
+constexpr std::size_t most_triangles = 60'000;  // limit for the whole figure
 constexpr double bend = 0.09;  // largest displacement, as a fraction of the diagonal
 
 plot::Panel shape_panel(const SolidMesh& mesh, const SolidModes& modes, std::size_t k,

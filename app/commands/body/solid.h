@@ -32,7 +32,7 @@ struct SolidBodyOptions {
   std::vector<PickedPlace> places;                // empty: four places far from each other
   std::optional<double> loss;                     // loss factor; overrides the material
   std::optional<std::array<double, 2>> rayleigh;  // a in 1/s, b in s; overrides the loss factor
-  std::vector<SolidClamp> clamps;                 // in the unit of the file
+  std::vector<SolidClamp> clamps;                 // clamped regions, in the unit of the file
   MeshOrder mesh;
   std::string picture;  // .svg of the lowest mode shapes; empty: none
 };

@@ -27,7 +27,7 @@ constexpr std::size_t stretch = 441;  // output samples that are timed at once
 constexpr int least_rounds = 3;
 constexpr int most_rounds = 100;
 
-Flag interrupted;  // by Ctrl-C
+Flag interrupted;  // set by Ctrl-C
 
 using ReportProgress = std::function<bool(const std::string&)>;
 

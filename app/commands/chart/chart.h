@@ -14,7 +14,7 @@ namespace ressort::commands {
 struct ChartOptions {
   std::vector<std::string> scenes;  // empty: the reference scenes
   std::string folder;               // created if it does not exist
-  double patience_s = 5.0;          // for timing one scene
+  double patience_s = 5.0;          // longest time for timing one scene
 };
 
 // Writes chart.csv and, with gnuplot, overview.svg and SCENE.svg into the folder. Returns the exit

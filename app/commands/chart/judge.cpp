@@ -20,7 +20,7 @@ constexpr std::array<double, 3> windows_s = {0.005, 0.05, heard_s};
 constexpr unsigned stress_times = 16;
 constexpr double stress_s = 0.1;
 constexpr double contact_stress_s = 5.0;  // long, because a contact gains little energy at a time
-constexpr double stress_gain = 1.1;       // of energy, without any work done
+constexpr double stress_gain = 1.1;       // factor of energy, without any work done
 // factor of the energy, or twice that of the peak, relative to 16 times the rate
 constexpr double stress_excess = 4.0;
 
@@ -72,7 +72,7 @@ class EnergyMeter {
   EnergyReading reading_;
   bool has_begun_ = false;
   double highest_ = -HUGE_VAL;  // while contacts and plucks store no energy
-  double held_ = -HUGE_VAL;     // at any time
+  double held_ = -HUGE_VAL;     // highest value at any time
 };
 
 // The inputs of one part, sample by sample.

@@ -25,7 +25,8 @@ struct References {
   double floor_db = 0.0;
   std::string how;        // the physical reference was found
   std::size_t onset = 0;  // first audible sample
-  double window_s = 0.0;  // from the onset: the longest in which the reference can be trusted
+  // length from the onset: the longest in which the reference can be trusted
+  double window_s = 0.0;
 
   // Signal to error in the window, [ChartReference].
   std::array<double, 2> snr_db(const Waves& found) const;
@@ -58,7 +59,7 @@ class Stress {
   struct Case {
     std::string name;
     ChartScene scene;
-    double peak = 0.0;    // at 16 times the rate
+    double peak = 0.0;    // value at 16 times the rate
     double energy = 0.0;  // the highest at 16 times the rate
   };
   std::vector<Case> cases_;

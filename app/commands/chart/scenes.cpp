@@ -16,7 +16,7 @@
 namespace ressort::commands {
 namespace {
 
-constexpr double velocity = 0.8;      // of the note
+constexpr double velocity = 0.8;      // velocity of the note
 constexpr double blow = 0.01;         // per sample: x[-1] = x[0] - blow
 constexpr double bow_start_s = 0.01;  // time constant of a bow that gets up to speed
 constexpr double reach_s = 0.005;     // time constant of an input that moves to a position
@@ -317,7 +317,7 @@ Starts::Starts(const ChartScene& scene) {
   if (!scene.is_linear) {
     return;
   }
-  Network heard = scene.network;  // with an output at every mass that moves
+  Network heard = scene.network;  // has an output at every moving mass
   heard.outputs.clear();
   for (std::uint32_t i = 0; i < heard.masses.size(); ++i) {
     if (moves(heard.masses[i])) {

@@ -20,7 +20,7 @@ enum ChartReference : std::size_t {
 
 struct ChartRow {
   Way way;
-  std::string methods;                // of its parts, "modal" or "grid+direct"
+  std::string methods;                // methods of its parts, "modal" or "grid+direct"
   std::vector<std::string> twins;     // methods with the same output
   double ns = 0.0;                    // per output sample, one voice; 0: not timed
   std::array<double, 2> snr_db{};  // [ChartReference] NaN if unknown
@@ -32,9 +32,9 @@ struct ChartRow {
 struct ChartSheet {
   std::string scene;
   std::string about;               // the excitation
-  std::string reference;           // how the physical reference was found
+  std::string reference;           // description of the physical reference
   std::optional<double> floor_db;  // accuracy of a physical reference that is not exact
-  double window_s = 1.0;           // of the sound that is compared
+  double window_s = 1.0;           // length of the compared sound
   std::vector<ChartRow> rows;
 };
 

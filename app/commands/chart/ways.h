@@ -17,7 +17,7 @@ struct Way {
   std::string line;              // the curve that joins it to others, in the order of the table
   std::string label;  // text beside its mark; empty for most
   std::optional<Method> method;  // empty: the plan's choice
-  std::string budget;            // as for --budget
+  std::string budget;            // budget, in the notation of --budget
   unsigned oversampling = 1;
   Precision precision = Precision::float64;
   bool is_bare = true;  // ignores the preset's budget
@@ -30,7 +30,7 @@ const char* precision_name(Precision precision);
 struct MadeWay {
   Way way;
   std::unique_ptr<Engine> engine;  // owns the machine
-  std::string methods;             // of its parts, "modal" or "grid+direct"
+  std::string methods;             // methods of its parts, "modal" or "grid+direct"
   std::vector<std::string> twins;  // ways with the same output
   std::unique_ptr<ChartPlayer> player;
 

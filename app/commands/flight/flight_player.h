@@ -19,7 +19,8 @@ class FlightPlayer {
 
   double rate_hz() const { return rate_hz_; }
   std::size_t channels() const { return channels_; }
-  std::int64_t frames() const { return flight_.end_frame - heard_from_; }  // of the played part
+  // length of the played part
+  std::int64_t frames() const { return flight_.end_frame - heard_from_; }
   // Returns reasons why the sound may differ from the performance.
   std::vector<std::string> warnings() const;
 

@@ -34,7 +34,7 @@ constexpr int note_key = 57;
 // slower.
 struct Register {
   int shift = 0;         // semitones, whole octaves
-  double stretch = 1.0;  // of time
+  double stretch = 1.0;  // factor on all times
 };
 
 Register register_of(const Preset& preset) {

@@ -26,7 +26,7 @@ struct PresetFigures {
   std::optional<double> attack_ms;
   std::optional<double> held_t60_s;      // while the key is down
   std::optional<double> released_t60_s;  // after its release
-  double cpu_share = 0.0;                // of one core, for one voice
+  double cpu_share = 0.0;                // fraction of one core, for one voice
 };
 
 struct ShownPreset {
@@ -34,9 +34,9 @@ struct ShownPreset {
   std::string description;
   std::string failure;  // error message; the rest is empty then
   std::vector<ShownNote> notes;
-  std::vector<double> peaks_dbfs;   // of the phrase, in equal steps
+  std::vector<double> peaks_dbfs;   // peaks of the phrase, in equal steps
   std::vector<double> levels_dbfs;  // RMS, in the same steps
-  Spectrogram spectrogram;          // of the phrase
+  Spectrogram spectrogram;          // spectrogram of the phrase
   PresetFigures figures;
   std::string drawing;  // its figure, as SVG
 };

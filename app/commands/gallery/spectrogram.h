@@ -14,7 +14,7 @@ struct Spectrogram {
   double highest_hz = 14080.0;  // nine octaves higher
   double from_s = 0.0;
   double to_s = 0.0;
-  std::size_t rows = 0;  // at equal ratios, from the lowest to the highest frequency
+  std::size_t rows = 0;  // rows at equal ratios, from the lowest to the highest frequency
   std::size_t columns = 0;
   std::vector<double> dbfs;  // [row][column], level of a sinusoid, mean power of the channels
 

@@ -12,7 +12,7 @@
 namespace ressort::commands {
 namespace {
 
-constexpr std::size_t most_dots = 900;  // of a panel
+constexpr std::size_t most_dots = 900;  // largest number of masses drawn in a panel
 constexpr double up_colour = 0xc8402f;
 constexpr double down_colour = 0x2f6fc8;
 constexpr double still_colour = 0xbbbbbb;

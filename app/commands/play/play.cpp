@@ -559,7 +559,7 @@ class Player {
 
   PlayOptions options_;
   sigset_t signals_;
-  bool has_called_off_ = false;            // by a signal
+  bool has_called_off_ = false;            // set by a signal
   std::optional<LastResort> last_resort_;  // set by the first signal; destroyed last
   MotionFeed motion_{process_};
   std::unique_ptr<const SampleTape> tape_;  // outlives the process that plays it
@@ -570,12 +570,12 @@ class Player {
   MidiSink door_{process_};
   std::mutex device_mutex_;  // between main and the session's worker
   AudioDevice device_;
-  std::string device_kind_;  // of the open device
+  std::string device_kind_;  // kind of the open device
   int audio_inputs_ = 0;
   std::unique_ptr<NsmClient> manager_;  // null: none
   NsmProject project_;                  // the open one
   std::string first_name_;              // played if the session is new
-  std::vector<std::string> tuning_;     // from the session
+  std::vector<std::string> tuning_;     // tuning files of the session
   std::unique_ptr<Session> session_;
   std::unique_ptr<OscServer> osc_;
   std::mutex panel_mutex_;  // guards the panel's pointer

@@ -183,7 +183,7 @@ class Track {
 // frame.
 struct Division {
   double ticks_per_quarter = 0.0;  // 0: ticks divide SMPTE frames
-  double tick_s = 0.0;             // of SMPTE time
+  double tick_s = 0.0;             // length of a tick of SMPTE time
 };
 
 Division read_division(Reader& reader) {

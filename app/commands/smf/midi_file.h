@@ -18,12 +18,12 @@ inline constexpr std::size_t max_midi_file_bytes = std::size_t{16} << 20;
 struct MidiFile {
   struct Message {
     double time_s = 0.0;
-    std::uint32_t first = 0;  // of `bytes`
+    std::uint32_t first = 0;  // index into `bytes`
     std::uint32_t count = 0;
   };
-  std::vector<Message> messages;    // of all tracks, sorted by time, then by track
-  std::vector<std::uint8_t> bytes;  // of the messages, each with its status byte
-  double length_s = 0.0;            // to the last event, ends of tracks included
+  std::vector<Message> messages;    // messages of all tracks, sorted by time, then by track
+  std::vector<std::uint8_t> bytes;  // bytes of the messages, each with its status byte
+  double length_s = 0.0;            // time of the last event, ends of tracks included
 
   std::span<const std::uint8_t> bytes_of(const Message& message) const {
     return std::span(bytes).subspan(message.first, message.count);

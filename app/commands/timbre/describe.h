@@ -34,12 +34,12 @@ struct DescribeOptions {
   bool force = false;  // overwrites existing files
   bool as_json = false;
   DescriptionOptions how;
-  std::size_t modes = 0;     // of a sound file: number of modes whose T60 is printed
-  double rate_hz = 44100.0;  // of models and presets
-  int key = 57;              // of presets: the rendered note
-  double seconds = 3.0;      // of presets: length; the key is held for two thirds
+  std::size_t modes = 0;     // sound files: number of modes whose T60 is printed
+  double rate_hz = 44100.0;  // sample rate of models and presets
+  int key = 57;              // presets: the rendered note
+  double seconds = 3.0;      // presets: length; the key is held for two thirds
   std::optional<ThirdArgument> third;
-  std::vector<Setting> settings;      // of a model or a preset
+  std::vector<Setting> settings;      // parameters of a model or a preset
   std::vector<SweptParameter> swept;  // all combinations of their values
   std::vector<std::string> figures;   // plotted for a sweep
   std::vector<FigureLaw> laws;        // plotted for a sweep

@@ -9,8 +9,8 @@ namespace {
 
 constexpr double lowest_hz = 20.0;
 constexpr double floor_db = -100.0;
-constexpr std::size_t most_points = 2000;  // of a curve over time
-constexpr double pixels = 1700.0;          // of a curve over frequency
+constexpr std::size_t most_points = 2000;  // limit for a curve over time
+constexpr double pixels = 1700.0;          // points of a curve over frequency
 
 // A frequency that is drawn over time. Each has its own dash pattern, so that grey print is
 // legible.

@@ -13,8 +13,9 @@ namespace ressort::commands {
 namespace {
 
 constexpr std::size_t block_frames = 4096;
-constexpr double quietest_share = 1e-3;       // of the loudest frame; softer frames are not counted
-constexpr double longest_modal_s = 60.0;      // of a sound in closed form
+// fraction of the loudest frame; softer frames are not counted
+constexpr double quietest_share = 1e-3;
+constexpr double longest_modal_s = 60.0;      // length of a sound in closed form
 constexpr long long most_frames = 4'000'000;  // eleven hours at 48 kHz, and 1.4 GB
 constexpr double envelope_rate_hz = 1000.0;
 
@@ -137,7 +138,7 @@ Result<Description> describe_frame(const std::string& path, MonoReader& sound, l
   const auto hop = static_cast<long long>(options.hop);
   const auto size = static_cast<long long>(options.frame);
   const long long first = at >= hop ? at - hop : at;
-  std::vector<double> samples;  // from `first` on
+  std::vector<double> samples;  // samples from `first` on
   while (sound.read_so_far() < at + size) {
     const long long block_at = sound.read_so_far();
     const auto block = sound.next();

@@ -42,7 +42,7 @@ struct Description {
   std::optional<double> f0_hz;
   std::vector<DescribedFrame> frames;
   std::optional<TemporalShape> temporal;  // empty if there is only one frame
-  std::vector<DescribedMode> modes;       // in closed form or on request
+  std::vector<DescribedMode> modes;       // modes, in closed form or on request
   // Spectrum of the loudest frame, [bin], or [line] in closed form.
   std::vector<double> frequencies_hz;
   std::vector<double> spectrum;  // magnitude or power

@@ -19,7 +19,7 @@ struct ShapeOptions {
   bool as_json = false;
   std::vector<TimbreTarget> targets;  // override those of the sound file
   std::string like;                   // sound file; empty: none
-  std::optional<int> key;             // of presets; empty: A3, or the sound file's
+  std::optional<int> key;             // key of presets; empty: A3, or the sound file's
   std::optional<double> rate_hz;      // empty: 44100, or the sound file's
   std::optional<ThirdArgument> third;
 };

@@ -24,7 +24,7 @@ struct SweepRow {
 };
 struct SweepTable {
   std::string of;                  // name, for people
-  std::vector<std::string> names;  // of the figures
+  std::vector<std::string> names;  // names of the figures
   std::vector<SweepRow> rows;      // the first parameter varies slowest
 };
 

@@ -21,15 +21,15 @@ struct FlightEngine {
   std::uint32_t serial = 0;
   bool lets_ring = false;
   bool has_new_numbers = false;
-  std::string path;                                     // of the scene
+  std::string path;                                     // path of the scene
   std::shared_ptr<const std::vector<SceneFile>> files;  // all files of the scene
   std::vector<Setting> kept;  // present parameter values, which override the texts'
   double rate_hz = 0.0;
   std::uint32_t most_modes = 0;
   bool find_gain = false;
   bool force = false;
-  double gain = 1.0;               // of the compiled preset, which may differ from its text
-  std::vector<std::string> forms;  // of its plan, which depends on measurements; see Choice
+  double gain = 1.0;               // gain of the compiled preset, which may differ from its text
+  std::vector<std::string> forms;  // forms of its plan, which depend on measurements; see Choice
 };
 
 // Options common to all engines.

@@ -349,9 +349,9 @@ class FlightReader {
 
   std::string_view rest_;
   int line_ = 0;
-  std::string advice_;  // what to use instead of a word that is no longer known
+  std::string advice_;  // replacement of a word that is no longer known
   Flight flight_;
-  std::vector<std::shared_ptr<std::vector<SceneFile>>> texts_;  // of models and presets
+  std::vector<std::shared_ptr<std::vector<SceneFile>>> texts_;  // texts of models and presets
 };
 
 }  // namespace

@@ -18,7 +18,7 @@
 namespace ressort::session {
 namespace {
 
-constexpr double missed_by = 0.1;  // in JND: a smaller deviation counts as reached
+constexpr double missed_by = 0.1;  // deviation in JND; a smaller one counts as reached
 
 // Returns the suffix of a figure's name from its '_' on, or an empty string.
 std::string_view unit_of(TargetFigure figure) {

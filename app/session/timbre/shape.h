@@ -22,7 +22,7 @@ std::string short_name(TargetFigure figure);
 
 struct ShapeRequest {
   const Scene& scene;
-  const std::vector<ParameterInfo>& parameters;  // with their stable ranges
+  const std::vector<ParameterInfo>& parameters;  // parameters with their stable ranges
   std::vector<double> values;                    // [parameter] present values
   bool has_keys = false;                         // keys set the pitch
   int key = 57;                                  // the key whose timbre is adjusted

@@ -16,7 +16,7 @@ namespace ressort::session {
 
 // A figure of one frame. The three tristimulus figures follow each other.
 struct TimbreFigure {
-  std::string_view name;  // with its unit
+  std::string_view name;  // name with its unit
   std::optional<double> (*of)(const FrameTimbre& timbre);
 };
 std::span<const TimbreFigure> timbre_figures();

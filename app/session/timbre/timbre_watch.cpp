@@ -84,7 +84,7 @@ void TimbreWatch::work() {
 void TimbreWatch::hear() {
   const double rate_hz = process_.clock.read().rate_hz;
   RecordedChunk chunk;
-  while (process_.listening.pop(chunk)) {  // left from the last time
+  while (process_.listening.pop(chunk)) {  // chunks left from the last time
   }
   {
     const std::lock_guard lock(mutex_);

@@ -31,7 +31,7 @@ FileWatch::~FileWatch() {
 }
 
 bool FileWatch::follow(const std::vector<std::string>& paths) {
-  std::map<std::string, Names> wanted;  // by folder
+  std::map<std::string, Names> wanted;  // names by folder
   const auto want = [&](const fs::path& path) {
     const fs::path folder = path.parent_path();
     wanted[folder.empty() ? "." : folder.string()].insert(path.filename().string());

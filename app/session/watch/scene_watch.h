@@ -15,9 +15,9 @@ namespace ressort::session {
 
 // The result of the last reload.
 struct Reload {
-  std::uint64_t count = 0;  // of reloads so far
+  std::uint64_t count = 0;  // number of reloads so far
   bool is_done = true;
-  std::string news;  // what has changed, or the errors, with the source lines
+  std::string news;  // description of the change, or the errors with the source lines
 };
 
 // All functions: [worker], unless they say otherwise.

@@ -76,7 +76,7 @@ class AccuracyMeter {
   struct Continuous {
     bool is_known = true;
     bool is_proportional = true;
-    std::vector<Mode> modes;                  // with proportional damping
+    std::vector<Mode> modes;                  // modes, with proportional damping
     std::vector<std::complex<double>> poles;  // otherwise, of oscillating modes
     std::vector<std::complex<double>> all_poles() const;
   };

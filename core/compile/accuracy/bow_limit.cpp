@@ -15,7 +15,7 @@ namespace ressort::compile {
 namespace {
 
 constexpr double highest_ratio = 3.0;         // Z / M
-constexpr double steps_of_oversampled = 4.0;  // of --method oversampled
+constexpr double steps_of_oversampled = 4.0;  // steps of --method oversampled
 constexpr double highest_rate_hz = 768'000.0;
 
 bool is_bow(Law law, Scheme scheme) {

@@ -53,7 +53,7 @@ struct Loop {
   std::uint32_t right(std::size_t place) const { return (*delays)[2 * place + 1]; }
 
   double inverse_impedance = 0.0;
-  double sign = 1.0;  // of the left-going wave
+  double sign = 1.0;  // sign of the left-going wave
   Complex back;       // 1/z
   Complex filters;
   std::uint32_t samples = 0;

@@ -16,8 +16,8 @@ using Complex = std::complex<double>;
 constexpr int most_newton_steps = 20;
 constexpr int most_roundings = 8;
 constexpr double converged = 1e-12;       // Newton step of a logarithm
-constexpr double small_step = 1e-6;       // for finite differences
-constexpr double most_change = 0.5;       // of a logarithm in one Newton step
+constexpr double small_step = 1e-6;       // step of finite differences
+constexpr double most_change = 0.5;       // largest change of a logarithm in one Newton step
 constexpr double same_mode = 1e-6;        // relative difference of two stiffnesses
 constexpr std::size_t most_sought = 320;  // masses of a part whose eigenvalues are computed
 
@@ -170,7 +170,7 @@ class TunedMode final : public TunedMotion {
 
 Pitches make_pitches(TunedMotion& motion, double rate_hz) {
   Pitches pitches;
-  double change = 1.0;  // of the factor by coupled modes, at the semitone above
+  double change = 1.0;  // change of the factor by coupled modes, at the semitone above
   const double nyquist = 0.5 * rate_hz * (1.0 - 1e-9);
   for (double hz = pitches.lowest_hz; hz < nyquist; hz *= std::exp2(1.0 / 12.0)) {
     pitches.factors.push_back(0.0);

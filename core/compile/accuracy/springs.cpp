@@ -10,9 +10,10 @@
 namespace ressort::compile {
 namespace {
 
-constexpr double diagonal_tolerance = 1e-9;  // of off-diagonal elements, relative to the largest
+// tolerance of off-diagonal elements, relative to the largest
+constexpr double diagonal_tolerance = 1e-9;
 constexpr double zero_tolerance = 1e-13;     // relative to the largest element
-constexpr double ratio_tolerance = 1e-12;    // of two equal ratios
+constexpr double ratio_tolerance = 1e-12;    // tolerance of equal ratios
 
 bool is_place(const Program& program, std::uint32_t node) {
   return !program.taps.empty() && node >= program.taps[0].node;

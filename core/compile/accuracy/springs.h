@@ -17,7 +17,7 @@ struct SpringDamper {
   std::vector<std::pair<std::uint32_t, double>> shares;  // moving node, weight
   double stiffness = 0.0;
   double damping = 0.0;
-  bool is_own = false;  // of an oscillator mass, not a link
+  bool is_own = false;  // belongs to an oscillator mass and is not a link
   Scheme scheme = Scheme::plain;
 };
 // `value`: [coefficient]. O(links)

@@ -27,7 +27,7 @@ class Bounder {
   // links and of d_a/m_a over all oscillators, where d is the sum of the weights at a mass.
   double operator()(const Weighing& weighing) const {
     std::vector<double> sum(program_.position.size(), 0.0);
-    std::map<std::uint32_t, double> at_macro;  // by its first place in tap_nodes
+    std::map<std::uint32_t, double> at_macro;  // keyed by its first place in tap_nodes
     each_link(weighing, [&](Ends ends, double weight) {
       for (const std::uint32_t end : {ends.a, ends.b}) {
         const TapSlot* const tap = tap_at(end);

@@ -67,7 +67,7 @@ class Channels {
   bool is_member(std::uint8_t channel) const { return master_of(channel) != channel; }
   // The channels whose zone the last Change::zones has created or ended. Their state was reset.
   ChannelMask rezoned() const { return rezoned_; }
-  ChannelMask members() const;  // of all zones
+  ChannelMask members() const;  // members of all zones
   // Returns the zone's master, or the channel itself if it is not a member.
   std::uint8_t master_of(std::uint8_t channel) const;
 

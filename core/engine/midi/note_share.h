@@ -15,7 +15,7 @@ class NoteShare {
  public:
   static constexpr int most_parts = 64;
   struct Part {
-    int number = 1;  // of this engine, from 1
+    int number = 1;  // number of this engine, from 1
     int of = 1;      // number of engines
   };
 

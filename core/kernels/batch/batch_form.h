@@ -22,7 +22,7 @@ struct BatchSpring {
 
 // Any other link of a Batch.
 struct BatchLink {
-  std::uint32_t run = 0;  // of Program::link_runs
+  std::uint32_t run = 0;  // index into Program::link_runs
   std::uint32_t a = 0;    // nodes
   std::uint32_t b = 0;
 };

@@ -203,7 +203,7 @@ typename S::V shared(const Program& program, const S& s, std::uint32_t from, std
   const std::size_t other = at - program.taps[0].node;
   const TapSlot& slot = program.taps[one];
   if (slot.first != program.taps[other].first) {
-    return V{};  // on two macros
+    return V{};  // the points are on two macros
   }
   if (slot.is_on_body()) {
     const auto near = behind(s, one);

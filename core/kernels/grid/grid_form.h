@@ -24,7 +24,7 @@ struct GridSegment {
 
 // Links of one run whose second ends are `offsets` above their first ends.
 struct GridLinks {
-  std::uint32_t run = 0;     // of Program::link_runs
+  std::uint32_t run = 0;     // index into Program::link_runs
   bool is_reversed = false;  // the first ends are above the second ends instead
   std::vector<std::uint32_t> offsets;
   // [offset][slot - Grid::first] whether this slot has the link
@@ -33,15 +33,15 @@ struct GridLinks {
 
 // Links that do not fit into the regular structure. They are computed one by one.
 struct GridRest {
-  std::uint32_t run = 0;    // of Program::link_runs
-  std::uint32_t first = 0;  // of Grid::rest_ends
+  std::uint32_t run = 0;    // index into Program::link_runs
+  std::uint32_t first = 0;  // index into Grid::rest_ends
   std::uint32_t count = 0;
   bool is_excess = false;  // subtracts links that the segments compute although they do not exist
 };
 
 // A mass outside the grid.
 struct GridLoose {
-  std::uint32_t mass_run = 0;  // of Program::mass_runs
+  std::uint32_t mass_run = 0;  // index into Program::mass_runs
   std::uint32_t slot = 0;
 };
 
@@ -57,12 +57,12 @@ struct Grid {
   std::uint32_t slots = 0;
   std::uint32_t first = 0;     // slots [first, first + count) are the grid, multiples of grid_line;
   std::uint32_t count = 0;     // no offset reaches below 0 or beyond the last slot
-  std::uint32_t mass_run = 0;  // of Program::mass_runs, for all of the grid
+  std::uint32_t mass_run = 0;  // index into Program::mass_runs, for the whole grid
   std::vector<std::uint32_t> slot;    // [node]
   std::vector<double> position;       // [slot] at the start
   std::vector<double> velocity;       // [slot]
   std::vector<std::uint8_t> moves;    // [slot - first] 1 where a mass is, 0 elsewhere
-  std::uint32_t spring_run = 0;       // of Program::link_runs, for the segments
+  std::uint32_t spring_run = 0;       // index into Program::link_runs, for the segments
   std::vector<GridSegment> segments;  // none overlap
   // [slot - first] number of offsets without a neighbour, minus the number of additional springs to
   // 0

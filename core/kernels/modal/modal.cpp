@@ -6,7 +6,7 @@
 namespace ressort::kernels {
 namespace {
 
-constexpr std::size_t most_rows = 16;  // of one sweep
+constexpr std::size_t most_rows = 16;  // limit for one sweep
 
 constexpr std::size_t round_up(std::size_t count, std::size_t unit) {
   return (count + unit - 1) / unit * unit;

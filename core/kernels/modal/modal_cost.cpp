@@ -20,7 +20,7 @@ struct Rows {
 // Counts per voice. Modes that no link holds are stepped for a whole block at once. Held ones are
 // swept once a sample, with all their rows.
 double modal_operations(double modes, const Rows& rows, const Workload& load) {
-  constexpr double most_rows = 8.0;  // that are summed in one sweep
+  constexpr double most_rows = 8.0;  // rows that are summed in one sweep
   const double lanes = static_cast<double>(vector_bytes(load.isa)) / bytes_of_number(load);
   const double packs = modes / lanes;
   const double held = rows.places + rows.pushed;

@@ -32,7 +32,7 @@ double make_exact(double& k, double& z) {
 }
 
 constexpr std::size_t most_passive = 32;  // links, which are solved together
-constexpr double left_out_share = 0.02;   // of the budget
+constexpr double left_out_share = 0.02;   // fraction of the budget
 
 // Makes the modal form of a Program.
 class ModesFinder {

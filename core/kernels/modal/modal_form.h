@@ -19,7 +19,7 @@ struct ModalShare {
   std::uint32_t coefficient = 0;
   bool is_late = false;
   std::uint32_t first = 0;
-  std::vector<double> factor;  // of the modes from `first` on; 0 for all others
+  std::vector<double> factor;  // factors of the modes from `first` on; 0 for all others
 };
 
 // A mass or point at which something is read or acts. Its position is rest + sum of shape * q.
@@ -30,7 +30,7 @@ struct ModalPlace {
 
 // The nonlinear links of one run. An end is a place or, numbered on from these, one of Modes::ends.
 struct ModalHold {
-  std::uint32_t run = 0;  // of Program::link_runs: the law and its coefficients
+  std::uint32_t run = 0;  // index into Program::link_runs: the law and its coefficients
   std::vector<std::uint32_t> a;
   std::vector<std::uint32_t> b;  // [link] ends
   // [link] static compliance of the ends by the modes that are left out, times the coefficient

@@ -11,7 +11,7 @@ namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 constexpr std::uint32_t frames_after_touch =
-    256;  // from a contact until a free block is tried again
+    256;  // frames from a contact until a free block is tried again
 constexpr std::uint32_t nowhere = 0xffffffffu;
 
 // Computes one block: divides it into parts with constant and with changing coefficients, decides

@@ -93,7 +93,7 @@ struct StraightMatrices {
   }
 
   std::size_t count;
-  std::size_t packs;  // of a column
+  std::size_t packs;  // packs of a column
   std::size_t stride;
   T* coupling;
   T* inverse;

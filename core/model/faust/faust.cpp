@@ -120,7 +120,8 @@ struct FaustTerms {
   std::span<const std::string> masses;  // [mass] name, without the prefix x_, v_, n_ or to_
   std::span<const std::string> links;   // [link] name, without the prefix f_
   std::function<std::string(ArgumentId)> value;
-  std::function<std::string(ArgumentId, Unit)> scaled;  // at the sample rate of the program
+  // coefficient at the sample rate of the program
+  std::function<std::string(ArgumentId, Unit)> scaled;
   std::function<std::vector<FaustShare>(std::uint32_t point)> shares;
   std::function<std::string(std::uint32_t mass)> inverse_mass;
 };
@@ -639,7 +640,7 @@ class FaustWaveguides {
     std::string name;  // after g_, b_, d_
     const Macro* macro = nullptr;
     FiltersAt filters;
-    std::vector<Pass> passes;  // in the order of the wave, from the filters on
+    std::vector<Pass> passes;  // places in the order of the wave, from the filters on
   };
 
   double coordinate(std::uint32_t mass) const {

@@ -11,10 +11,10 @@
 namespace ressort::model {
 
 struct FaustOptions {
-  std::string name;                           // of the model
+  std::string name;                           // name of the model
   std::span<const ParameterSetting> sliders;  // [parameter]
   bool rescale = true;  // coefficients follow the sample rate, as in the engine
-  std::span<const LawFacts> laws = law_table();  // by Law; tests export a law of their own
+  std::span<const LawFacts> laws = law_table();  // facts by Law; tests export a law of their own
 };
 
 // Returns a complete FAUST program without libraries, which computes the engine's samples.

@@ -41,10 +41,10 @@ struct Keyword {
   int least;                   // fewest arguments
   int most;                    // most arguments, without a drawing
   bool drawable;               // may be followed by GROUP X Y
-  std::string_view arguments;  // for messages
-  MacroKind macro{};           // of Element::macro
-  Law law{};                   // of Element::link
-  const LawWord* link{};       // of Element::link
+  std::string_view arguments;  // description for messages
+  MacroKind macro{};           // macro of Element::macro
+  Law law{};                   // law of Element::link
+  const LawWord* link{};       // keyword of Element::link
 };
 
 // Returns all keywords, including those of the laws. [any thread]

@@ -50,7 +50,7 @@ void Reader::add_macro(const Line& line) {
     resting_.push_back(line.element);
   } else {
     show(velocity_, line, "gives a macro a motion");
-    double far_x = 0.0;  // of the other end, for drawing
+    double far_x = 0.0;  // drawing position of the other end
     double far_y = 0.0;
     is_placed |= position(line, at++, macro.third, far_x, far_y);
   }

@@ -27,7 +27,7 @@ struct ReadOptions {
   // Meaning of the third state argument; overrides the text.
   std::optional<ThirdArgument> third;
   std::string_view third_by = "requested";  // the reason in ParsedNetwork::motion
-  std::uint64_t most_nodes = max_macro_nodes;   // of all macros together; at most a billion
+  std::uint64_t most_nodes = max_macro_nodes;  // limit for all macros together; at most a billion
   Progress progress =
       {};  // when it stops the reader, the only diagnostic is `stopped`, without a line
 };
@@ -45,7 +45,7 @@ struct ParsedNetwork {
 ParsedNetwork parse_network(std::string_view text, const ReadOptions& options = {});
 
 inline constexpr std::size_t max_model_bytes = std::size_t{32} << 20;
-inline constexpr int max_channels = 64;  // of inputs and of outputs each
+inline constexpr int max_channels = 64;  // limit for inputs and for outputs
 
 // Returns "file:line:column: error: message".
 std::string to_string(const Diagnostic& diagnostic, std::string_view file);

@@ -43,9 +43,9 @@ struct Line {
   const Keyword* keyword = nullptr;
   Token label;             // without its '@'
   Token word;              // the keyword as written
-  std::string_view group;  // of the display block around it; empty if there is none
+  std::string_view group;  // name of the display block around it; empty if there is none
   std::span<const Token> rest;
-  std::span<const Token> coordinates;  // of places written without brackets, as in MIMS
+  std::span<const Token> coordinates;  // coordinates of places written without brackets, as in MIMS
   std::uint32_t element = undeclared;  // the mass or macro
 };
 
@@ -190,19 +190,19 @@ class Reader {
   DiagnosticCount count_;
   std::string_view text_;
   std::vector<Entry> entries_;
-  IndexTable labels_;          // of entries
-  std::vector<Token> tokens_;  // of the current line
-  std::vector<Token> parts_;   // of a place in it
+  IndexTable labels_;          // table of entries
+  std::vector<Token> tokens_;  // tokens of the current line
+  std::vector<Token> parts_;   // tokens of a place in it
   std::vector<std::string> parameter_names_;
   std::vector<const Keyword*> macro_keywords_;                  // [macro]
   std::vector<std::uint32_t> resting_;                          // macros without a velocity
-  std::uint64_t most_nodes_ = max_macro_nodes;                  // of all macros
-  std::uint64_t nodes_ = 0;                                     // of all macros
+  std::uint64_t most_nodes_ = max_macro_nodes;                  // limit for all macros
+  std::uint64_t nodes_ = 0;                                     // nodes of all macros
   std::unordered_map<std::string_view, ArgumentId> arguments_;  // text -> index
-  std::vector<std::string_view> group_names_ = {""};            // of all display blocks
+  std::vector<std::string_view> group_names_ = {""};            // names of all display blocks
   std::vector<std::uint32_t> groups_;                           // the open ones
-  Evidence velocity_;                                           // of MIMS4Max
-  Evidence delayed_;                                            // of MIMS
+  Evidence velocity_;                                           // evidence of MIMS4Max
+  Evidence delayed_;                                            // evidence of MIMS
   std::optional<ThirdArgument> said_;                           // set by ~motion
   int said_line_ = 0;
 };

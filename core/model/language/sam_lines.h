@@ -28,7 +28,7 @@ struct SamDefinition {
   bool is_parameter = false;
   bool is_open = false;  // being resolved; detects cycles
   bool is_read = false;
-  std::string text;  // in the .mdl language, once resolved
+  std::string text;  // text in the .mdl language, once resolved
 };
 
 inline constexpr std::size_t longest_expression = 10000;  // bytes, with all definitions inserted
@@ -79,7 +79,7 @@ class SamLines {
   bool read_end(const Origin& origin, Token& rest);
   bool read_slider(const Origin& origin, const Token& token, double& start);
 
-  std::map<std::string, SamDefinition> lines_;  // by name
+  std::map<std::string, SamDefinition> lines_;  // definitions by name
   std::size_t spent_ = 0;                       // total bytes of expressions
   DiagnosticCount count_;
 };

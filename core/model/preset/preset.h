@@ -32,7 +32,7 @@ enum class ControlSource { note, controller, pressure, osc, audio };
 
 struct ControlSetting {
   ControlSource source = ControlSource::note;
-  int number = 0;       // of the controller (0..127) or the audio channel (from 1)
+  int number = 0;       // number of the controller (0..127) or the audio channel (from 1)
   std::string address;  // OSC name, such as "/finger"
   std::string target;   // "in1" or a parameter's name
   Gesture gesture = Gesture::position;
@@ -50,7 +50,7 @@ struct ControlSetting {
   double shortest_ms = 0.0;
   int lowest_key = 0;
   int highest_key = 127;
-  int turn = 1;  // of notes: its place among `turns` round-robin controls
+  int turn = 1;  // place of a note's control among `turns` round-robin controls
   int turns = 1;
   SourceLocation location;
   bool operator==(const ControlSetting&) const = default;
@@ -59,15 +59,15 @@ struct ControlSetting {
 // A stop of a morph: a preset, or values of the model's parameters.
 struct MorphSetting {
   std::string preset;                    // name; empty: use `values`
-  std::vector<ParameterSetting> values;  // with empty ranges
-  double gain = 1.0;                     // for `values`; a preset has its own
+  std::vector<ParameterSetting> values;  // values with empty ranges
+  double gain = 1.0;                     // gain for `values`; a preset has its own
   SourceLocation location;
   bool operator==(const MorphSetting&) const = default;
 };
 
 struct Preset {
   std::string model;                    // file name, next to the preset or in the models' folder
-  SourceLocation model_location{1, 1};  // of `model`
+  SourceLocation model_location{1, 1};  // location of `model`
   std::vector<std::string> with;        // more models, appended to its text
   std::vector<std::string> fixed;       // labels of elements whose stiffness keys do not change
   std::string description;              // one line

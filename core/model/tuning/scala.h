@@ -17,7 +17,8 @@ inline constexpr int max_mapped_keys = 1024;
 
 // One period of a scale.
 struct Scale {
-  std::vector<double> cents;  // of every step but the first, which is 0; the last is the period
+  // cents of every step but the first, which is 0; the last is the period
+  std::vector<double> cents;
 };
 
 // The steps of the keys. Keys outside first_key..last_key are tuned as without a scale.

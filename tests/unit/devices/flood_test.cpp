@@ -10,7 +10,7 @@ using namespace support;
 namespace {
 
 constexpr std::size_t period = 256;
-constexpr std::size_t flood = 581;         // of a period, at 100,000 a second
+constexpr std::size_t flood = 581;         // events of a period, at 100,000 a second
 constexpr std::int64_t far = 432000;       // 9.8 s
 constexpr std::size_t steal_frames = 221;  // the fade of a panic, 5 ms
 

@@ -438,7 +438,7 @@ TEST_CASE("the outputs modulate noise that is the same in every run", "[gesture]
     power += white * white / 20000;
   }
   CHECK(std::fabs(mean) < 0.02);  // 5 standard deviations of the mean of a uniform distribution
-  CHECK(std::fabs(power - 1.0 / 3.0) < 0.011);  // and of its square
+  CHECK(std::fabs(power - 1.0 / 3.0) < 0.011);  // 5 standard deviations of the mean of its square
 }
 
 }  // namespace ressort::gesture_test

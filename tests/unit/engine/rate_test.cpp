@@ -20,7 +20,7 @@ constexpr double rates_hz[] = {44100.0, 48000.0, 88200.0, 96000.0, 192000.0};
 struct Scene {
   std::string name;
   std::string text;
-  double k = 0.0;      // of the lowest mode, over its mass
+  double k = 0.0;      // stiffness of the lowest mode, over its mass
   double z = 0.0;      // the same for damping
   double share = 1.0;  // share of the mode's amplitude from the input to the output
 };
@@ -74,7 +74,7 @@ std::vector<double> struck_once(const Scene& scene, double rate_hz, double secon
 struct Ring {
   double hz = 0.0;
   double decay = 0.0;      // 1/s
-  double amplitude = 0.0;  // at the start
+  double amplitude = 0.0;  // amplitude at the start
 };
 
 // Measures pitch and decay of the mode near a guess, from its phase and level in two windows 0.1 s

@@ -53,7 +53,7 @@ double damped_cosine(double k, double z, double a, double b, double n) {
 
 struct Pole {
   double cents = 0.0;        // relative to the continuous oscillator
-  double t60_percent = 0.0;  // how much longer than that of the continuous oscillator, in percent
+  double t60_percent = 0.0;  // excess over the continuous oscillator's T60, in percent
 };
 
 // Returns the pole, from the recurrence x[n+1] = a x[n] - b x[n-1] of the samples.

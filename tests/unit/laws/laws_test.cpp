@@ -16,7 +16,7 @@ namespace {
 
 using support::Random;
 
-constexpr int draws = 2000;  // of each law
+constexpr int draws = 2000;  // draws for each law
 
 // Calls `use(type, random)` for every law.
 template <class Use>

@@ -19,7 +19,7 @@ struct Counted {
   Counted(const Counted&) = delete;
   Counted& operator=(const Counted&) = delete;
   int serial;
-  int touched = 0;  // by the other thread
+  int touched = 0;  // objects seen by the other thread
   static inline std::atomic<int> alive{0};
 };
 

@@ -237,7 +237,7 @@ TEST_CASE("a WAV of unknown or great length can exceed 4 GB", "[files]") {
     CHECK(folder.text("a.part.wav").substr(0, 4) == "RF64");
     REQUIRE(file->write(ramp(100).data(), 100));
     REQUIRE(file->close());
-    CHECK(folder.text("a.wav").substr(0, 4) == "RIFF");  // in the end it did not
+    CHECK(folder.text("a.wav").substr(0, 4) == "RIFF");  // it did not exceed 4 GB in the end
     CHECK(read_sound(path)->channels[0].size() == 100);
   }
 }

@@ -45,7 +45,7 @@ TEST_CASE("rec records the output frame by frame", "[recorder]") {
 TEST_CASE("a recording starts at the command, with the actual channels", "[recorder]") {
   const Folder folder;
   Harness harness(4);
-  harness.process.is_recording.raise();  // left over in the ring
+  harness.process.is_recording.raise();  // chunks left over in the ring
   harness.play();
   harness.process.is_recording.lower();
   harness.say("rec " + folder.file("four.wav"));

@@ -123,7 +123,7 @@ struct Stage {
 
   Process process;
   Session session;
-  std::size_t heap_calls = 0;  // of the audio thread
+  std::size_t heap_calls = 0;  // heap calls of the audio thread
   std::vector<double> heard;
 };
 
