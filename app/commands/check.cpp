@@ -225,7 +225,8 @@ std::string conclusion(const Scene& scene, const Proved& proved) {
       return has_ranges
                  ? "not stable in all ranges of the parameters; the limits above hold for one "
                    "parameter while the others keep their initial values"
-                 : "not stable; the limits above hold for one parameter while the others keep their values";
+                 : "not stable; the limits above hold for one parameter while the others keep "
+                   "their values";
     case Verdict::unproved:
       return "not proved stable" + by_bound(proved);
   }

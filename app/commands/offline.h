@@ -23,11 +23,11 @@ struct RenderOptions {
   // of decay, or of the MIDI file and its decay, at most a minute.
   std::optional<double> seconds;
   std::optional<long long> frames;
-  std::string input;                // sound file; channel N drives input N
-  std::string score;                // score file
-  std::string midi;                 // Standard MIDI File, in addition to the score
-  std::string phrase;               // text of a score, instead of the default phrase
-  std::vector<Setting> parameters;  // set before the first sample
+  std::string input;                   // sound file; channel N drives input N
+  std::string score;                   // score file
+  std::string midi;                    // Standard MIDI File, in addition to the score
+  std::string phrase;                  // text of a score, instead of the default phrase
+  std::vector<Setting> parameters;     // set before the first sample
   std::optional<SampleFormat> format;  // empty: the best that the format supports
   Precision precision = Precision::float64;
   bool rescale = true;

@@ -328,8 +328,9 @@ struct Terminal::Input {
                              typed != nullptr ? static_cast<std::size_t>(count) : 0);
       set_editing(false);
       if (!line.ends_with('\n')) {
-        ressort::say(must_end() ? ""
-                                : "\nThe console is closed and the sound continues; press Ctrl-C to quit.");
+        ressort::say(
+            must_end() ? ""
+                       : "\nThe console is closed and the sound continues; press Ctrl-C to quit.");
         break;
       }
       const std::string words = line.substr(0, line.find_last_not_of(" \t\n") + 1);

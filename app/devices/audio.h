@@ -14,7 +14,7 @@ namespace ressort::devices {
 
 struct AudioOptions {
   std::string client_name = "ressort";
-  bool connect = false;  // connects to the physical outputs and all MIDI sources
+  bool connect = false;            // connects to the physical outputs and all MIDI sources
   int outputs = 2;                 // ports: out_left and out_right, or out_1 and so on
   double rate_hz = 48000.0;        // ignored by JACK, which has its own
   int period_frames = 256;         // ignored by JACK, which has its own

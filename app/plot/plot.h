@@ -54,11 +54,11 @@ struct Panel {
   Axis x;
   Axis y;
   std::vector<Series> series;
-  double height = 0.0;  // pixels; 0: as in the figure
+  double height = 0.0;       // pixels; 0: as in the figure
   double left_margin = 0.0;  // pixels; 0: room for numbers
   bool has_axes = true;      // false: curves alone, in the whole panel
   bool is_solid = false;     // the data are points in space: x, y, z, and the colour for "pm3d"
-  bool is_true = false;  // one unit has the same length in x and y
+  bool is_true = false;      // one unit has the same length in x and y
   std::string note;          // a sentence in the middle, for a panel without data
   ColourMap colours = ColourMap::none;
   double lightest = 0.0;  // the ends of the colour map
@@ -69,7 +69,7 @@ struct Panel {
 
 struct Figure {
   std::string title;
-  std::string caption;  // below the panels; '\n' starts a new line
+  std::string caption;         // below the panels; '\n' starts a new line
   double panel_width = 420.0;  // pixels
   double panel_height = 260.0;
   std::size_t columns = 1;

@@ -12,8 +12,8 @@
 #include "app/realtime/lockfree.h"
 #include "app/realtime/midi.h"
 #include "app/realtime/motion.h"
-#include "core/engine/engine.h"
 #include "core/engine/dc_blocker.h"
+#include "core/engine/engine.h"
 #include "core/engine/limiter.h"
 
 namespace ressort::realtime {

@@ -32,8 +32,8 @@ class ThreadPool final : public Executor {
 
   const SeqLock<ClockReading>* const clock_;
   HazardPointer<Team> shown_;
-  AtomicTime next_ns_;       // start of the next period that needs help
-  AtomicTime period_ns_;     // 0: unknown
+  AtomicTime next_ns_;    // start of the next period that needs help
+  AtomicTime period_ns_;  // 0: unknown
   // frame of the newest period; only the thread that shows a team uses it
   std::int64_t frame_ = -1;
   Counter taken_over_;

@@ -23,7 +23,7 @@ struct SessionOptions {
   std::optional<ThirdArgument> third;  // overrides every model's own meaning
   KeyOptions keys;                     // overrides every preset's tuning
   bool watch = false;                  // reload the playing scene when its files change
-  bool keeps_flights = false;  // records flights and saves them after problems
+  bool keeps_flights = false;          // records flights and saves them after problems
   // The clock that measures forms, and the file that keeps the results. Without a clock no form is
   // measured, and without a file no result is kept.
   decltype(Timings::time) time = {};

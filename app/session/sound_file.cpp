@@ -42,7 +42,7 @@ constexpr Kind kinds[] = {
 };
 // size of all samples; the rest is for the header
 constexpr double most_bytes = 4294967295.0 - 1048576.0;
-constexpr std::chrono::milliseconds header_age{500};     // interval of header updates
+constexpr std::chrono::milliseconds header_age{500};  // interval of header updates
 
 const Kind* kind_of(const std::string& path) {
   std::string ending = fs::path(path).extension().string();

@@ -90,7 +90,7 @@ Planned plan(const CompileRequest& request, const Analysis& analysis, const Proo
 
 struct BowCheck {
   std::optional<Error> error;  // a bow that is too strong at the start values
-  std::string note;  // the pitch above which the strongest bow is too strong
+  std::string note;            // the pitch above which the strongest bow is too strong
 };
 BowCheck check_bows(const CompileRequest& request, const Network& network, const Schemes& schemes,
                     const Analysis& analysis, const Proof& proof, const Machine& machine,

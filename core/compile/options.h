@@ -19,8 +19,8 @@ namespace ressort::compile {
 
 struct CompileOptions {
   double rate_hz = 44100.0;
-  bool rescale = true;  // keeps pitch and decay at other rates than the model's 44,100 Hz
-  bool bare = false;  // the network as written: no smoothing and no sleep
+  bool rescale = true;    // keeps pitch and decay at other rates than the model's 44,100 Hz
+  bool bare = false;      // the network as written: no smoothing and no sleep
   int voices = 0;         // replaces the preset's number; 0: the preset's
   NoteShare::Part share;  // share of the notes that this engine plays
   Precision precision = Precision::float64;
@@ -31,12 +31,12 @@ struct CompileOptions {
   // measurements for the plan; null: the same forms on every machine
   const Timings* timings = nullptr;
   std::vector<std::string> forms;  // forms of an earlier plan, which is repeated; see Choice
-  Executor* executor = nullptr;              // helper threads; outlives the engine; null: none
-  bool find_gain = false;         // choose the gain so that a forte note peaks at -6 dBFS
-  bool force = false;             // do not narrow ranges to stable values
-  std::vector<Setting> settings;  // initial values of the bare network's parameters
-  std::vector<Setting> reach;     // values that its parameters will get later
-  Progress progress = {};         // stopping it makes compile_network() fail with `stopped`
+  Executor* executor = nullptr;    // helper threads; outlives the engine; null: none
+  bool find_gain = false;          // choose the gain so that a forte note peaks at -6 dBFS
+  bool force = false;              // do not narrow ranges to stable values
+  std::vector<Setting> settings;   // initial values of the bare network's parameters
+  std::vector<Setting> reach;      // values that its parameters will get later
+  Progress progress = {};          // stopping it makes compile_network() fail with `stopped`
   std::uint64_t most_bytes = std::numeric_limits<std::uint64_t>::max();  // limit of the engine
 };
 

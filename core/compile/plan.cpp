@@ -123,7 +123,7 @@ class Chooser {
     std::string name;
     double operations;
     std::optional<Accuracy> of_form;  // error of this form alone
-    Accuracy accuracy;  // including the error of the parts before
+    Accuracy accuracy;                // including the error of the parts before
     std::optional<double> measured_ns = {};
   };
 
@@ -357,8 +357,8 @@ class Chooser {
   const Timings* timings_;
   std::string recorded_;
   std::uint32_t most_modes_;
-  std::uint32_t eigenvectors_of_;  // connected masses
-  Budget budget_;                  // without the limits that the published scheme keeps
+  std::uint32_t eigenvectors_of_;   // connected masses
+  Budget budget_;                   // without the limits that the published scheme keeps
   AccuracyMeter* meter_ = nullptr;  // null: the published scheme is accurate enough
   Accuracy spent_;
   Accuracy accuracy_;      // error of the chosen form

@@ -18,7 +18,7 @@ namespace ressort::compile {
 
 // Largest number of masses whose eigenvectors are computed; the time grows with the third power. A
 // method that the user requests by name has no such limit.
-inline constexpr std::uint32_t quick_modes = 320;  // while the user waits: 20 ms
+inline constexpr std::uint32_t quick_modes = 320;     // while the user waits: 20 ms
 inline constexpr std::uint32_t patient_modes = 1000;  // while the model already plays: 0.5 s
 
 // Connected masses, and the kernel that steps them.
@@ -31,9 +31,9 @@ struct Part {
   // the same on every machine, and the time measured on this machine, 0 if unknown.
   double estimated_ns = 0.0;
   double measured_ns = 0.0;
-  int voices = 1;  // number of voices of both
+  int voices = 1;                    // number of voices of both
   bool may_gain = false;             // its modes were not computed, and may be cheaper
-  bool is_untimed = false;  // Not all of its possible forms are measured yet.
+  bool is_untimed = false;           // Not all of its possible forms are measured yet.
   std::optional<Accuracy> accuracy;  // if a budget limits pitch or decay
   std::string reason;
 

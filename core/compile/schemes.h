@@ -18,7 +18,7 @@ namespace ressort::compile {
 struct Schemes {
   std::vector<LinkScheme> links;   // [link] of a network without macros
   std::vector<std::string> notes;  // a sentence for each law that is made passive
-  std::optional<Error> hazard;  // links that may gain energy, with the model's line
+  std::optional<Error> hazard;     // links that may gain energy, with the model's line
 };
 
 // Makes every nonlinear link passive, unless the budget says `passive=never` or all its strengths

@@ -26,7 +26,7 @@ struct Workload {
   // the highest stable factor on every stiffness in the published scheme
   double highest_factor = 1.0;
   double wanted_factor = 1.0;  // the factor that keys require
-  double moving = 0.25;  // fraction of the samples in which any parameter moves
+  double moving = 0.25;        // fraction of the samples in which any parameter moves
   // executor among which large parts may be divided; null: one core for all
   Executor* executor = nullptr;
   bool reaches_beyond() const { return wanted_factor > highest_factor; }

@@ -1,5 +1,6 @@
-// core/laws: tools for the passive forms of laws, which cannot create energy. A passive force depends
-// on the distance one sample ago (before), now, and at the next sample without the link (free):
+// core/laws: tools for the passive forms of laws, which cannot create energy. A passive force
+// depends on the distance one sample ago (before), now, and at the next sample without the link
+// (free):
 //
 //   after = free - gamma f,  gamma = w_a + w_b, the inverse masses of the moving ends
 //
@@ -10,9 +11,9 @@
 // (after - before)/2.
 //
 // Laws and their tools are compiled once for each instruction set, in the inline namespace
-// RESSORT_ISA, so that the linker never merges code for a wide processor into code for a narrow one.
-// The inner namespace RESSORT_ROUNDING does the same for `exact` kernels, which are built without
-// fused multiply-adds.
+// RESSORT_ISA, so that the linker never merges code for a wide processor into code for a narrow
+// one. The inner namespace RESSORT_ROUNDING does the same for `exact` kernels, which are built
+// without fused multiply-adds.
 #pragma once
 
 #include "core/lanes.h"
@@ -58,9 +59,9 @@ static constexpr Scalar<V> tiny_share() {
 inline constexpr int most_newton_steps = 48;
 
 // Returns the f = g(after) that solves after + gamma g(after) = free between `far` and `free`.
-// Safeguarded Newton's method: a step that would leave the bracket, or where g falls too steeply, is
-// replaced by bisection. Lanes that have converged do not change any more, so that the result of a
-// lane does not depend on the others.
+// Safeguarded Newton's method: a step that would leave the bracket, or where g falls too steeply,
+// is replaced by bisection. Lanes that have converged do not change any more, so that the result of
+// a lane does not depend on the others.
 template <class V, class Force>
 static inline V force_between(V far, V start, V free, V gamma, Force&& g) {
   constexpr Scalar<V> tiny = tiny_share<V>();
@@ -94,8 +95,8 @@ static inline V rising_force(V free, V gamma, Force&& g) {
 }
 
 // Returns (P(after) - P(before))/step for after = before + step, and its slope. For short steps,
-// where the difference would be rounding noise, and where squares underflow, it returns the force at
-// the midpoint instead.
+// where the difference would be rounding noise, and where squares underflow, it returns the force
+// at the midpoint instead.
 template <class V, class Potential>
 static inline Slope<V> discrete_gradient(const Potential& potential, V before, V step) {
   using T = Scalar<V>;
@@ -143,9 +144,9 @@ static inline bool may_touch(const LinkState<V>& m, V t) {
   return any_of((m.before() > -t) | (m.now > -t) | (m.free > -t));
 }
 
-// Returns the passive force of a friction law. Its `grip(wanted, last, half)` is the friction f(v) at
-// the speed v that solves v + half f(v) = wanted after the speed `last`. Friction dissipates energy
-// at each of several solutions.
+// Returns the passive force of a friction law. Its `grip(wanted, last, half)` is the friction f(v)
+// at the speed v that solves v + half f(v) = wanted after the speed `last`. Friction dissipates
+// energy at each of several solutions.
 template <class V, class Friction>
 static inline V rubbed(const Friction& bow, const LinkState<V>& link) {
   return bow.grip((link.speed + link.fast) / 2, link.speed, link.gamma / 2);

@@ -148,7 +148,7 @@ class NumberCheck {
 }  // namespace
 
 std::optional<Error> find_invalid_number(const Network& network, std::span<const double> parameters,
-                               double rate_ratio) {
+                                         double rate_ratio) {
   return NumberCheck(network, parameters, rate_ratio).run();
 }
 

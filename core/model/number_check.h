@@ -13,6 +13,6 @@ namespace ressort::model {
 // or with a mass that is not above 0. Ignores arguments that audio inputs set. O(n). [any thread
 // but audio]
 std::optional<Error> find_invalid_number(const Network& network, std::span<const double> parameters,
-                               double rate_ratio);
+                                         double rate_ratio);
 
 }  // namespace ressort::model

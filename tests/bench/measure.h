@@ -36,7 +36,7 @@ class Timed {
   double play(std::size_t blocks);
   std::unique_ptr<Player> player_;
   std::size_t blocks_ = 1;  // blocks in a round
-  std::size_t next_ = 0;  // next block of the cycle
+  std::size_t next_ = 0;    // next block of the cycle
   std::vector<double> took_;
 };
 

@@ -127,8 +127,8 @@ TEST_CASE("no power-law contact gains energy at any stiffness", "[published]") {
 }
 
 TEST_CASE("a damped contact restores the energy of Hunt and Crossley's model", "[published]") {
-  // The speeds in and out, with L = Z/K, obey the same integral of v dv/(K +- Z v) for every P (Hunt
-  // and Crossley 1975): v/L - ln(1 + L v)/L^2 in, -w/L - ln(1 - L w)/L^2 out.
+  // The speeds in and out, with L = Z/K, obey the same integral of v dv/(K +- Z v) for every P
+  // (Hunt and Crossley 1975): v/L - ln(1 + L v)/L^2 in, -w/L - ln(1 - L w)/L^2 out.
   for (const double p : {1.0, 1.5, 2.3}) {
     for (const double damped : {.05, .3, 1.0, 4.0}) {  // L v
       const double v = 1e-3;

@@ -48,9 +48,9 @@ struct NonlinearScene {
   std::vector<double> grounds;
   std::vector<SceneLink> links;
   std::vector<Push> pushes;  // One input each.
-  bool has_hand = false;  // It has one link to the last mass, whose other links are all linear.
-  double hand_speed = 0.0;  // Per sample.
-  double hand_turn = 1.0;  // Position at which it turns back.
+  bool has_hand = false;     // It has one link to the last mass, whose other links are all linear.
+  double hand_speed = 0.0;   // Per sample.
+  double hand_turn = 1.0;    // Position at which it turns back.
 
   std::size_t nodes() const { return masses.size() + grounds.size() + (has_hand ? 1 : 0); }
   double hand_at(std::size_t n) const {

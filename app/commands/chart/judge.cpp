@@ -11,8 +11,8 @@
 namespace ressort::commands {
 namespace {
 
-constexpr double exact_db = 400.0;         // indistinguishable from exact
-constexpr double trusted_db = 60.0;        // a reference agrees with itself
+constexpr double exact_db = 400.0;    // indistinguishable from exact
+constexpr double trusted_db = 60.0;   // a reference agrees with itself
 constexpr double heard_share = 1e-6;  // relative to the peak: here the sound has begun
 // largest number of masses and links for a reference at 256 times the rate
 constexpr std::size_t small_scene = 1000;

@@ -23,7 +23,7 @@ struct ChartRow {
   std::string methods;                // methods of its parts, "modal" or "grid+direct"
   std::vector<std::string> twins;     // methods with the same output
   double ns = 0.0;                    // per output sample, one voice; 0: not timed
-  std::array<double, 2> snr_db{};  // [ChartReference] NaN if unknown
+  std::array<double, 2> snr_db{};     // [ChartReference] NaN if unknown
   std::string failure;                // why it is unstable; empty if it is stable
   std::array<bool, 2> is_on_front{};  // [ChartReference]
 };

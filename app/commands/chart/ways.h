@@ -15,7 +15,7 @@ namespace ressort::commands {
 struct Way {
   std::string name;              // "direct 4x", "modal silence=-60"
   std::string line;              // the curve that joins it to others, in the order of the table
-  std::string label;  // text beside its mark; empty for most
+  std::string label;             // text beside its mark; empty for most
   std::optional<Method> method;  // empty: the plan's choice
   std::string budget;            // budget, in the notation of --budget
   unsigned oversampling = 1;

@@ -30,7 +30,7 @@ class OscOutlet {
 
   // All of these: [any thread but audio]
   void received(const OscSender& from, std::size_t bytes);
-  bool may_answer(const OscSender& to);      // Applies AnswerBudget.
+  bool may_answer(const OscSender& to);       // Applies AnswerBudget.
   double reply_pause_s(const OscSender& to);  // Applies AnswerBudget.
   // Returns whether there is room for a reply of many rows.
   bool has_room();

@@ -34,7 +34,7 @@ class OscServer {
   Packets ask(std::vector<std::uint8_t> packet, std::function<void(Packets)> later);
 
   bool listens_on_udp() const;  // True if it listens on UDP.
-  int port() const;       // The port in use; differs from the requested one only if that was 0.
+  int port() const;  // The port in use; differs from the requested one only if that was 0.
   std::string access() const;  // Describes who may send.
 
  private:

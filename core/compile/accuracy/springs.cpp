@@ -12,8 +12,8 @@ namespace {
 
 // tolerance of off-diagonal elements, relative to the largest
 constexpr double diagonal_tolerance = 1e-9;
-constexpr double zero_tolerance = 1e-13;     // relative to the largest element
-constexpr double ratio_tolerance = 1e-12;    // tolerance of equal ratios
+constexpr double zero_tolerance = 1e-13;   // relative to the largest element
+constexpr double ratio_tolerance = 1e-12;  // tolerance of equal ratios
 
 bool is_place(const Program& program, std::uint32_t node) {
   return !program.taps.empty() && node >= program.taps[0].node;

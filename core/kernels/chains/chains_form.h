@@ -23,7 +23,7 @@ struct Chain {
   // first of its masses in Chains::nodes, which are in order from one end to the other
   std::uint32_t first = 0;
   std::uint32_t count = 0;
-  std::uint32_t mass_run = 0;  // run of the Program that contains all of its masses
+  std::uint32_t mass_run = 0;   // run of the Program that contains all of its masses
   std::uint32_t stiffness = 0;  // coefficients of the springs
   std::uint32_t damping = 0;
   std::uint32_t left = free;  // node that holds the first mass by the same spring

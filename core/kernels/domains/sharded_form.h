@@ -19,7 +19,7 @@ class Executor;
 struct Shards {
   std::shared_ptr<const std::vector<Shard>> shards;
   Executor* executor = nullptr;  // outlives the kernels
-  std::uint32_t frames = 1;  // number of samples that shards step without synchronisation
+  std::uint32_t frames = 1;      // number of samples that shards step without synchronisation
 };
 
 // The halo is this much deeper than the number of samples: one level for the last sample's forces

@@ -37,13 +37,13 @@ template <class T>
 struct ModalShapes {
   std::size_t modes;
   std::size_t stride;
-  const T* stiffness;  // [share] factors, in the packs where the share has any
-  const T* damping;  // the same for damping
+  const T* stiffness;   // [share] factors, in the packs where the share has any
+  const T* damping;     // the same for damping
   T* pushes;            // [push][mode], followed without a gap by places and outputs
   T* places;            // [place][mode]
   T* outputs;           // [output][mode]
   const T* unscaled;    // [push, place, output][mode] of exact modes, as the form has them
-  const T* push_norm;  // [push] length of its row
+  const T* push_norm;   // [push] length of its row
   const T* place_norm;  // [place]
 };
 
@@ -74,12 +74,12 @@ struct ModalSleepPace {
 template <class T>
 struct ModalSleep : ModalSleepPace {
   T* spread;      // [mode] square of the amplitude per that of the state; 0: does not ring
-  T* decay;  // [mode] decay of an amplitude in check_frames
+  T* decay;       // [mode] decay of an amplitude in check_frames
   T* amplitude;   // [mode]
-  T* debt;  // [mode] amplitude of the dropped motion
-  T* loudness;  // [listener] recent loudness
-  T* room;  // [listener] amplitude that may still be dropped
-  T silence;  // share of `loudness` that may be dropped; 0: no mode sleeps
+  T* debt;        // [mode] amplitude of the dropped motion
+  T* loudness;    // [listener] recent loudness
+  T* room;        // [listener] amplitude that may still be dropped
+  T silence;      // share of `loudness` that may be dropped; 0: no mode sleeps
   T lately_kept;  // decay of `loudness` in check_frames
 };
 
@@ -108,7 +108,7 @@ template <class T>
 struct ModalInputs : ModalInputsPace {
   std::uint32_t* push_of;  // [0, pushing) their indices
   T* amplitude;            // [frame][push]
-  T* late;  // [push] amplitude of the sample before, if it acts late
+  T* late;                 // [push] amplitude of the sample before, if it acts late
 };
 
 // Positions of the ends, forces on them, and bounds on their motion (modal_bounds.h).
@@ -123,16 +123,16 @@ struct ModalEnds : ModalEndsPace<T> {
   T* v;           // [end] change per sample
   T* force;       // [end] summed by the plain links, used by the next sample
   T* exerted;     // [end] by passive links, in this sample
-  T* kicked;  // [place] sum of the magnitudes of a block's kicks
+  T* kicked;      // [place] sum of the magnitudes of a block's kicks
   T* compliance;  // [place] largest squared displacement per unit of energy
 };
 
 // The links that are computed in this block, and the places that they need.
 struct ModalHeldPace {
   std::uint32_t places = 0;
-  std::size_t links = 0;  // number of computed links, plain and passive
-  std::size_t all_links = 0;  // total number of links
-  std::uint32_t touched_frames = 0;  // samples until a block is tried as a free one
+  std::size_t links = 0;               // number of computed links, plain and passive
+  std::size_t all_links = 0;           // total number of links
+  std::uint32_t touched_frames = 0;    // samples until a block is tried as a free one
   std::uint32_t surprised_frames = 0;  // samples until fewer than all links are computed
 };
 template <class T>
@@ -146,8 +146,8 @@ struct ModalHeld : ModalHeldPace {
 
 // The links of the holds that are not plain, in their order (modal_passive.h).
 struct ModalPassivePace {
-  bool pulls = false;  // the links act from the second sample on
-  bool is_pushed = false;  // a link exerted a force in the last sample
+  bool pulls = false;         // the links act from the second sample on
+  bool is_pushed = false;     // a link exerted a force in the last sample
   bool shoves_later = false;  // the next sweep adds `shove`
   bool is_reply_stale = true;
   bool is_straight_stale = true;
@@ -156,19 +156,19 @@ template <class T>
 struct ModalPassive : ModalPassivePace {
   std::size_t count;
   const PassiveLink* links;  // [link]
-  PassiveTables* active;  // the computed links; their ends are {index of the link, nobody}
-  T* reply;  // [listener][link] displacement by a unit push between the link's ends, for w = 1
-  T* gamma;  // [link][link] change of one distance by a unit push of another link, for w = 1
-  T* opening;  // [link] distance of its ends after everything has moved
-  T* rush;  // [link] its change per sample
-  T* memory;                 // [active][passive_rows]
-  T* numbers;                // workspace of the solver
-  T* straight;               // workspace of modal_straight.h
-  T* pushed;                 // [link] force
-  T* shove;  // [row] displacement of q and d along the row of a place by the forces
-  const T* give;             // [link] as ModalHold::give
-  T* slack;  // [link] the same for the current coefficients
-  T* yield;  // [link] displacement of its ends by the omitted modes
+  PassiveTables* active;     // the computed links; their ends are {index of the link, nobody}
+  T* reply;       // [listener][link] displacement by a unit push between the link's ends, for w = 1
+  T* gamma;       // [link][link] change of one distance by a unit push of another link, for w = 1
+  T* opening;     // [link] distance of its ends after everything has moved
+  T* rush;        // [link] its change per sample
+  T* memory;      // [active][passive_rows]
+  T* numbers;     // workspace of the solver
+  T* straight;    // workspace of modal_straight.h
+  T* pushed;      // [link] force
+  T* shove;       // [row] displacement of q and d along the row of a place by the forces
+  const T* give;  // [link] as ModalHold::give
+  T* slack;       // [link] the same for the current coefficients
+  T* yield;       // [link] displacement of its ends by the omitted modes
   T* yield_step;  // [link] its change in the last sample
 };
 

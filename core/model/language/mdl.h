@@ -26,7 +26,7 @@ struct Diagnostic {
 struct ReadOptions {
   // Meaning of the third state argument; overrides the text.
   std::optional<ThirdArgument> third;
-  std::string_view third_by = "requested";  // the reason in ParsedNetwork::motion
+  std::string_view third_by = "requested";     // the reason in ParsedNetwork::motion
   std::uint64_t most_nodes = max_macro_nodes;  // limit for all macros together; at most a billion
   Progress progress =
       {};  // when it stops the reader, the only diagnostic is `stopped`, without a line

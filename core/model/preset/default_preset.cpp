@@ -164,9 +164,9 @@ std::optional<Error> idle_keys(const Network& network, const Preset& preset) {
   std::string why;
   for (std::size_t i = 0; i < std::min(most_told, network.inputs.size()); ++i) {
     const Input& input = network.inputs[i];
-    why +=
-        (i == 0 ? "" : ", ") + ("'@in" + std::to_string(input.number)) +
-        (input.is_force ? "' pushes a mass that never moves" : "' moves no pluck, no bow and no contact");
+    why += (i == 0 ? "" : ", ") + ("'@in" + std::to_string(input.number)) +
+           (input.is_force ? "' pushes a mass that never moves"
+                           : "' moves no pluck, no bow and no contact");
   }
   if (network.inputs.size() > most_told) {
     why += ", nor do " + std::to_string(network.inputs.size() - most_told) + " more";

@@ -46,8 +46,8 @@ double centroid_hz(const Stereo& sound);
 
 // Frequencies that a listener could hear as the pitch.
 struct Pitch {
-  double partial_hz = 0.0;  // the peak nearest to the requested frequency
-  double heard_hz = 0.0;  // the frequency with the strongest harmonics, between 20 Hz and 5 kHz
+  double partial_hz = 0.0;   // the peak nearest to the requested frequency
+  double heard_hz = 0.0;     // the frequency with the strongest harmonics, between 20 Hz and 5 kHz
   double level_db = -200.0;  // level of the partial relative to the strongest one
 };
 

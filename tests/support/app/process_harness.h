@@ -9,7 +9,8 @@ namespace ressort::support {
 inline constexpr double rate = 44100.0;
 inline constexpr std::size_t fade_frames = 2205;  // 50 ms
 
-inline PlayingEngine* sounding(const std::string& text, const Preset& preset, std::uint32_t serial) {
+inline PlayingEngine* sounding(const std::string& text, const Preset& preset,
+                               std::uint32_t serial) {
   // The direct form rounds the same for any division into blocks.
   auto compiled = compile_network(network_of(text), preset, {.method = Method::direct});
   REQUIRE(compiled);

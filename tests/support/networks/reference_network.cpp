@@ -52,7 +52,7 @@ class Builder {
     std::size_t rows = 1;
     std::size_t columns = 1;
     std::vector<Point*> nodes;  // Row by row.
-    std::vector<Real> shapes;  // mode shapes of a body, [place][mode]
+    std::vector<Real> shapes;   // mode shapes of a body, [place][mode]
   };
 
   Number number(ArgumentId id) const { return id == no_argument ? zero_ : made_.arguments[id]; }

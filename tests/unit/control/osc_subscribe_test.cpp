@@ -159,7 +159,7 @@ TEST_CASE("an integer velocity is a MIDI velocity, a float a fraction of full ve
   CHECK(velocity(0.5, "id") == 0.5);
   // A value above 1 is a MIDI velocity and no fraction.
   CHECK(velocity(100.0, "if") == 100.0 / 127.0);
-  CHECK(velocity(1.0, "") == 1.0 / 127.0);        // From a score.
+  CHECK(velocity(1.0, "") == 1.0 / 127.0);  // From a score.
 }
 
 }  // namespace ressort::osc_subscribe_test

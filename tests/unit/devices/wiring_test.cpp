@@ -59,7 +59,7 @@ TEST_CASE("a closing client loses its connections first, which does not count as
           "[wiring]") {
   Wiring wiring;
   look(wiring, {speaker, mixer}, all);
-  look(wiring, {speaker}, all);  // after its connections and before its ports
+  look(wiring, {speaker}, all);         // after its connections and before its ports
   look(wiring, {speaker}, all, false);  // again, because another connection changed
   CHECK(wiring.is_in_doubt());
   look(wiring, {speaker}, {speaker.theirs});

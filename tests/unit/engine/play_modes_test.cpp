@@ -359,7 +359,7 @@ TEST_CASE("a preset names the mode that sets its pitch", "[play_modes]") {
     CAPTURE(number);
     CHECK(1200.0 * std::log2(measured_hz(late, rate_hz, first_hz) / first_hz) ==
           Approx(0.0).margin(1.0));  // dispersion of the scheme between the two
-    if (number != 8) {  // The strike excited it, but it has decayed by then.
+    if (number != 8) {               // The strike excited it, but it has decayed by then.
       CHECK(1200.0 * std::log2(measured_hz(late, rate_hz, 440.0) / 440.0) ==
             Approx(0.0).margin(0.05));
     }

@@ -56,8 +56,8 @@ TEST_CASE("A mesh with modes is held and struck at places", "[modes_places]") {
     const ComparisonOptions options{.frames = 8820, .turns = turns};
     check_same<double>(in_modes(plucked + heard, Passivity::never), options, 1e-9);
     check_same<double>(in_modes(touched + heard, Passivity::always), options, 1e-9);
-    // The direct kernel takes, in substeps, the displacement of a place for its speed, and the modal
-    // kernel the speed of its masses.
+    // The direct kernel takes, in substeps, the displacement of a place for its speed, and the
+    // modal kernel the speed of its masses.
     check_same<double>(in_modes(plucked + heard, Passivity::always), options, 1e-5);
   }
 }

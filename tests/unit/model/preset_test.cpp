@@ -420,7 +420,8 @@ TEST_CASE("a model that no key can play suggests a line to add", "[preset]") {
         "@m0' would "
         "let keys strike it");
   CHECK(told(triangle + "@in1 frcInput @g\n@k audioParam @in2\n@o osc 1 k 0 0 0\n") ==
-        "4: no key plays this model: '@in1' pushes a mass that never moves; '@in3 frcInput @m0' would let "
+        "4: no key plays this model: '@in1' pushes a mass that never moves; '@in3 frcInput @m0' "
+        "would let "
         "keys strike it");
   CHECK(told("@s mesh 4 4 1. 0.1 0. 0. 0.\n").find("'@in1 frcInput [@s 0.3 0.4]'") !=
         std::string::npos);
