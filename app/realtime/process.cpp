@@ -152,7 +152,7 @@ bool Process::send_ahead(std::span<const TimedEvent> events) {
 }
 
 bool Process::schedule(std::int64_t frame, const Event& event) {
-  keeps_every_frame_ = true;  // nobody waits for the sound
+  keeps_every_frame_ = true;  // offline: there is no deadline
   if (!ahead_.take(1)) {
     dropped.add(1);
     return false;

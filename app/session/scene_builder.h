@@ -35,7 +35,7 @@ struct Draft {
   Scene scene;
   std::shared_ptr<const std::vector<SceneFile>> files;
   std::vector<Setting> kept;     // present parameter values, which override the texts'
-  bool continues_state = false;  // sounding voices continue if the engines are alike
+  bool continues_state = false;  // sounding voices continue if the engines have the same structure
   std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
 };
 

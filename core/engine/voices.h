@@ -79,7 +79,7 @@ struct alignas(64) Voice {
   std::size_t quiet_frames = 0;
   std::uint64_t turn = 0;     // serial number of its key press
   double frequency_hz = 0.0;  // without bend; 0: as the model is written
-  double key_hz = 0.0;        // frequency asked for, before the stability limit
+  double key_hz = 0.0;        // requested frequency, before the stability limit
   double semitones = 0.0;     // its own channel's bend and tuning
   double glide = 0.0;         // semitones left of the glide
   double glide_step = 0.0;    // semitones per max_block_frames

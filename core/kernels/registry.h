@@ -21,7 +21,7 @@
 
 namespace ressort::kernels {
 
-// The kernels that can be asked for by name.
+// The kernels that a user can select by name.
 enum class Method { direct, chains, modal, grid, batch, oversampled };
 
 // The arguments of the search for a kernel's tables.

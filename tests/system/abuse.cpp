@@ -1,8 +1,8 @@
 // Abuses instruments for any time: ressort_abuse SECONDS [SEED [NAME...]]. Sweeps every parameter
 // over its whole range and beyond at audio rate, once within the stable range and once forced;
-// strikes, forces and hands of any size; random keys, bends and controllers; audio inputs with
+// strikes, forces and positions of any size; random keys, bends and controllers; audio inputs with
 // noise, NaN and infinity. Every output sample must be finite and below the limiter's ceiling,
-// memory must not grow, and all notes must end once hands, pedals and levers are released. The seed
+// memory must not grow, and all notes must end once inputs, pedals and levers are released. The seed
 // of the random numbers is printed, to reproduce a failure.
 #include <array>
 #include <cmath>
@@ -60,7 +60,7 @@ class Abuser {
     return events;
   }
 
-  // Returns hands, keys, pedals, levers and parameters to their start.
+  // Returns position inputs, keys, pedals, levers and parameters to their start.
   std::vector<Event> end() const {
     std::vector<Event> events;
     for (std::size_t i = 0; i < instrument_.parameters.size(); ++i) {

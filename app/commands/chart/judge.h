@@ -47,7 +47,7 @@ struct EnergyReading {
 };
 std::optional<EnergyReading> watch_energy(const ChartScene& scene, MadeWay& way, double seconds);
 
-// Tests methods with a scene, as it is and struck ten times harder.
+// Tests methods with a scene, as written and struck ten times harder.
 class Stress {
  public:
   Stress(const ChartScene& scene, Isa isa);

@@ -49,7 +49,7 @@ struct TargetFigureRow {
   // May be below 0. Otherwise a ratio must be above 0, and other figures at least 0.
   bool is_signed = false;
 };
-// Returns what is wrong with a target value, such as "must be a number above 0"; empty if valid.
+// Returns the fault of a target value, such as "must be a number above 0"; empty if valid.
 std::string_view target_error(TargetFigure figure, double value);
 const TargetFigureRow& row_of(TargetFigure figure);
 std::span<const TargetFigureRow> target_figure_rows();

@@ -85,7 +85,7 @@ std::string in_db(double share) {
 }  // namespace
 
 double operations(const Program& program, const Modes& form, const Workload& load) {
-  // A force is heard along two rows of its own, sample by sample, as places are.
+  // A force output needs two more rows, computed in every sample, as those of places are.
   const auto places = static_cast<double>(form.places.size());
   const Rows rows{.places = places + static_cast<double>(2 * force_count(form)),
                   .heard = static_cast<double>(form.outputs.size()),

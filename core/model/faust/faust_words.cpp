@@ -160,7 +160,7 @@ with {
   quotient = (e(b + s) - e(b))/wide;
 };
 // The force in the very first sample of a link that is under tension as it starts: its potential
-// must not rise above what it holds there.
+// must not rise above its initial value.
 first_alone(g, before, speed, way, gamma) =
   select2(abs(force)*gamma > abs(way), force, way/gamma)
 with {

@@ -102,7 +102,7 @@ Played played(std::size_t blocks, double fixed, double each) {
 
 }  // namespace
 
-// --- who gives way
+// --- order of stealing
 // -------------------------------------------------------------------------------
 
 TEST_CASE("an engine keeps the loudest held voices and the newest", "[overload]") {
@@ -148,7 +148,7 @@ TEST_CASE("an engine keeps the loudest held voices and the newest", "[overload]"
   CHECK(player.heap_calls == 0);
 }
 
-// --- how many
+// --- voice limit
 // ------------------------------------------------------------------------------------
 
 TEST_CASE("the mean covers a second, and the lasting load is the median of five spans",
@@ -304,7 +304,7 @@ TEST_CASE("without a clock the load is not measured and no voice is stolen", "[o
   CHECK(harness.process.meters().cpu_peak == 0.0);
 }
 
-// --- what is told
+// --- messages
 // --------------------------------------------------------------------------------
 
 TEST_CASE("the warning about a plan too large for one core says how many voices fit",

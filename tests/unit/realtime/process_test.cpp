@@ -145,7 +145,7 @@ TEST_CASE("a note from before the swap ends in the old model, a new one starts i
   Harness harness;
   harness.process.slot.offer(sounding(hand_text, holding(), 1));
   harness.now(note_on(0, 60));
-  harness.run(10240);  // the hand has reached 1
+  harness.run(10240);  // the position input has reached 1
   harness.out[0].clear();
   harness.process.slot.offer(constant("0.", 2));
   harness.at(10240 + 500, note_off(0, 60));
@@ -261,7 +261,7 @@ TEST_CASE("an early offer waits, and a replaced offer is returned", "[process]")
   delete second;
 }
 
-// --- what comes out
+// --- output
 // -------------------------------------------------------------------------------
 
 TEST_CASE("the block length does not change the limiter's output", "[process]") {
