@@ -496,7 +496,9 @@ Finding finding_of(const std::string& file, std::string_view text, const Error& 
 }
 
 Finding finding_in_model(const Scene& scene, const Error& error) {
-  const ModelText file = text_at(scene.texts, error.line);
+  // A scene made in memory has a path and no texts.
+  const ModelText file =
+      scene.texts.empty() ? ModelText{scene.model_path, 1} : text_at(scene.texts, error.line);
   Error there = error;
   there.line -= error.line > 0 ? file.first_line - 1 : 0;
   const auto text = read_text(file.path, max_model_bytes);
