@@ -110,7 +110,7 @@ Result<Done> carry_out(ConsoleContext& console, const Command& command) {
   if (!row) {
     return row.error();
   }
-  return act(console, **row, command.words);
+  return run_command(console, **row, command.words);
 }
 
 // Returns files with one of the endings whose names start with `typed`, and folders.

@@ -122,7 +122,7 @@ Result<Done> play_words(ConsoleContext& console, const Row& row, Words words) {
 
 }  // namespace
 
-Result<Done> act(ConsoleContext& console, const Row& row, Words words) {
+Result<Done> run_command(ConsoleContext& console, const Row& row, Words words) {
   return row.act != nullptr ? row.act(console, words) : play_words(console, row, words);
 }
 

@@ -33,7 +33,7 @@ Result<std::vector<Event>> play(ConsoleContext& console, const Message& message)
 std::string meant_parameter(const Instrument& instrument, const std::string& word);
 
 // Executes a command. The number of words has been checked.
-Result<Done> act(ConsoleContext& console, const Row& row, Words words);
+Result<Done> run_command(ConsoleContext& console, const Row& row, Words words);
 
 // Parse the arguments about modes that console and OSC share: a count; MODE NOTE|HZ [T60] [PART].
 Result<std::size_t> mode_count(const Argument& argument);

@@ -45,7 +45,7 @@ std::optional<int> DspLoad::update_limit(int sounding, int all) {
   }
   is_new_ = false;
   if (is_over() && waits_s_ == 0.0) {
-    return give_way(sounding, all);
+    return steal_voices(sounding, all);
   }
   if (limit_ == 0 || quiet_s_ < low_s) {
     return {};
@@ -59,7 +59,7 @@ std::optional<int> DspLoad::update_limit(int sounding, int all) {
   return limit_;
 }
 
-std::optional<int> DspLoad::give_way(int sounding, int all) {
+std::optional<int> DspLoad::steal_voices(int sounding, int all) {
   first_ = first_ == 0.0 ? lasting_ : first_;
   if (sounding <= 1) {
     if (limit_ == 0 || lasting_ < unmoved * first_) {

@@ -40,7 +40,7 @@ class DspLoad {
   void forget();
 
  private:
-  std::optional<int> give_way(int sounding, int all);
+  std::optional<int> steal_voices(int sounding, int all);
 
   double mean_ = 0.0;
   double lasting_ = 0.0;

@@ -47,7 +47,7 @@ class NetworkBound {
       add(a, link);
       add(b, link);
     }
-    settle_live_places();
+    bound_live_places();
     divide_by_masses();
     for (const Sum& sum : sums_) {
       bound(sum);
@@ -99,7 +99,7 @@ class NetworkBound {
 
   // A link at a live place may hold any node of the macro, and all such links may hold the same
   // node.
-  void settle_live_places() {
+  void bound_live_places() {
     std::map<std::uint32_t, Sum> macros;  // Keyed by first node.
     for (const auto& [tap, sum] : live_) {
       macros[network_.taps[tap].first].add(sum, 1.0);

@@ -82,7 +82,7 @@ bool BoundaryFinder::fails(const Weights& weights) {
     return false;
   }
   return assembly_.wandering_ends == 0 || !is_usable(weights) ||
-         definite_.wander(diagonal(weights, limit_of_scheme), weights.terms).alone >= 1.0;
+         definite_.test_moving_ends(diagonal(weights, limit_of_scheme), weights.terms).alone >= 1.0;
 }
 
 bool BoundaryFinder::is_definite(std::span<const double> diagonal, std::span<const double> terms) {
@@ -106,7 +106,7 @@ bool BoundaryFinder::factors(const Weights& weights, double limit) {
     return true;
   }
   return assembly_.wandering_ends > 0 && is_exact() &&
-         definite_.wander(diagonal, weights.terms).together < 1.0 - rounding;
+         definite_.test_moving_ends(diagonal, weights.terms).together < 1.0 - rounding;
 }
 
 // Returns x^T (4M - K - 2Z) x, and the larger of the two terms of that difference.
@@ -168,7 +168,7 @@ void BoundaryFinder::refine(const Weights& weights, std::vector<double>& shape) 
 
 // Each term's bound is affine in the weights, or in their inverse if the weight is a mass. Two
 // points therefore give the place where the first bound reaches the limit.
-std::optional<double> BoundaryFinder::met(const WeightLine& line, double safe) {
+std::optional<double> BoundaryFinder::bound_crossing(const WeightLine& line, double safe) {
   const double other = safe > 0.0 ? 0.5 * safe : 1.0;
   const auto bounds_at = [&](double at) {
     std::vector<double> bounds(assembly_.terms.size());

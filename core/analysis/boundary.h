@@ -58,7 +58,7 @@ class BoundaryFinder {
 
   // Finds the boundary by the edge bound alone, at or above 0 on either side of `safe`, with six
   // evaluations of the line. Empty if it would have to be searched for.
-  std::optional<double> met(const WeightLine& line, double safe);
+  std::optional<double> bound_crossing(const WeightLine& line, double safe);
 
   // Returns whether the weights are unstable wherever the moving places are. Call it only where
   // holds() is false.

@@ -87,8 +87,8 @@ bool Definite::factor(std::span<const double> diagonal, std::span<const double> 
 // largest g^T A^-1 g over all positions of an end, including those between two nodes. Every |g_i^T
 // A^-1 g_j| is at most sqrt(c_i c_j), and it is 0 between parts, so the norm is at most the largest
 // sum of w c within a part.
-Definite::Wandering Definite::wander(std::span<const double> diagonal,
-                                     std::span<const double> weights) {
+Definite::Wandering Definite::test_moving_ends(std::span<const double> diagonal,
+                                               std::span<const double> weights) {
   constexpr double infinity = std::numeric_limits<double>::infinity();
   std::vector<double> rest(weights.begin(), weights.end());
   for (std::size_t t = 0; t < rest.size(); ++t) {

@@ -35,7 +35,7 @@ class Definite {
     double together = 0.0;
     double alone = 0.0;
   };
-  Wandering wander(std::span<const double> diagonal, std::span<const double> weights);
+  Wandering test_moving_ends(std::span<const double> diagonal, std::span<const double> weights);
 
   // Solves for x in place with the last matrix that factor() found positive definite.
   void solve(std::vector<double>& x) const;

@@ -258,7 +258,8 @@ std::optional<SafeRange> Proofs::safe_range(const ParameterBox& box, std::size_t
 
 SafeRange Proofs::range_around(const WeightLine& line, double anchor) {
   SafeRange range{0.0, unbounded};
-  if (const auto boundary = boundary_.is_exact() ? std::nullopt : boundary_.met(line, anchor)) {
+  if (const auto boundary =
+          boundary_.is_exact() ? std::nullopt : boundary_.bound_crossing(line, anchor)) {
     // Masses have a lower limit, stiffnesses an upper one; the search continues on the other side.
     const bool is_lowest = *boundary < anchor;
     (is_lowest ? range.lowest : range.highest) = *boundary;

@@ -76,7 +76,7 @@ class Chooser {
     } else {
       consider_identical();
     }
-    settle();
+    apply_measurements();
     Part part = take("");
     part.may_gain = may_gain_;
     return part;
@@ -102,7 +102,7 @@ class Chooser {
         nominal_ns * candidates_[best_].operations > 0.5e9 / program_.rate_hz * load_.voices) {
       return std::nullopt;
     }
-    settle();
+    apply_measurements();
     return take("for its highest keys");
   }
   bool may_gain() const { return may_gain_; }
@@ -278,7 +278,7 @@ class Chooser {
 
   // Replaces the first in rank by the form of an earlier plan, or by a form that is measured to be
   // clearly cheaper.
-  void settle() {
+  void apply_measurements() {
     const auto recorded =
         std::find_if(candidates_.begin(), candidates_.end(),
                      [&](const Candidate& candidate) { return candidate.name == recorded_; });

@@ -186,7 +186,7 @@ void Voices::advance_gains(std::size_t frames) {
 }
 
 bool Voices::update(Voice& voice) {
-  voice.decay.settle();
+  voice.decay.finish_approach();
   const double peak =
       voice.peak * playing_.gain * voice.decay.gain * std::max(voice.volume[0], voice.volume[1]);
   voice.peak = 0.0;

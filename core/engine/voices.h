@@ -38,7 +38,7 @@ struct Decay {
     gain = std::max(0.0, gain * kept - fade_step);
   }
   // Ends the approach to `kept_goal`, which the filter alone would never complete.
-  void settle() {
+  void finish_approach() {
     constexpr double nothing = 1e-12;
     kept = std::fabs(kept - kept_goal) < nothing ? kept_goal : kept;
   }

@@ -113,7 +113,7 @@ class Search {
 
   // Searches the first `frames` samples of the residual and adds the poles found. Poles damped more
   // than `most_alpha` were out of reach of earlier searches, so they are searched again.
-  void look(const PoleSearch& search, std::size_t frames, double most_alpha) {
+  void search_residual(const PoleSearch& search, std::size_t frames, double most_alpha) {
     if (frames < shortest_for(search) || fit_.rest_energy() < rounding * sound_energy_) {
       return;
     }
@@ -133,8 +133,8 @@ class Search {
     }
     progress_.stage("fitting the modes to the sound");
     add(strongest(std::move(found), start));
-    drop_accidents();
-    settle(2, 3);
+    drop_insignificant();
+    prune(2, 3);
   }
 
   // Starts from these poles instead of a search.
@@ -142,7 +142,7 @@ class Search {
 
   void finish() {
     progress_.stage("fitting the modes to the sound");
-    settle(20, 10);
+    prune(20, 10);
   }
 
   std::size_t frames() const { return sound_[0].size(); }
@@ -194,7 +194,7 @@ class Search {
 
   // Alternates between fitting and removing until every mode stands above the noise and is distinct
   // from its neighbours.
-  void settle(int steps, int rounds) {
+  void prune(int steps, int rounds) {
     fit_.refine(steps, progress_);
     int dropped = 0;
     while (dropped < rounds && drop_unlikely(true, Noise(fit_.rest()))) {
@@ -207,7 +207,7 @@ class Search {
   }
 
   // Removes modes that noise could explain, the least likely first.
-  void drop_accidents() {
+  void drop_insignificant() {
     for (int round = 0; round < 12; ++round) {
       const Noise noise(fit_.rest());
       int drops = 0;
@@ -301,9 +301,9 @@ void search_all(Search& search, double rate_hz) {
   std::size_t lost = 1;
   for (const Stage& stage : stages) {
     const PoleSearch wanted{stage.decimation, highest};
-    search.look(wanted,
-                std::min(search.frames(), static_cast<std::size_t>(stage.length_s * rate_hz)),
-                stage.most_alpha / static_cast<double>(lost));
+    search.search_residual(
+        wanted, std::min(search.frames(), static_cast<std::size_t>(stage.length_s * rate_hz)),
+        stage.most_alpha / static_cast<double>(lost));
     lost = frames_lost(wanted);
   }
   search.finish();
@@ -350,7 +350,7 @@ struct Found {
 enum class Fate { kept, steady, unfit };
 
 // Extrapolates the mode back in time.
-void go_back(Found& found, double samples) {
+void extrapolate_back(Found& found, double samples) {
   for (std::size_t c = 0; c < found.mode.c.size(); ++c) {
     found.mode.c[c] *= std::exp(-found.mode.log_z * samples);
     // The start was not observed, so the uncertainty of the pole adds to that of the amplitude.
@@ -538,7 +538,7 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
   made.analysed_s = static_cast<double>(frames) / rate_hz;
   for (Found& found : all_found(search->fit())) {
     const Fate fate = fate_of(found, rate_hz, frames);
-    go_back(found, skipped);
+    extrapolate_back(found, skipped);
     if (fate == Fate::kept && !is_too_loud(found, blow->peak)) {
       kept.push_back(std::move(found));
     } else if (fate == Fate::steady) {

@@ -85,7 +85,7 @@ std::optional<Error> differs(const Network& base, const MorphStop& stop) {
   if (a == b) {
     return std::nullopt;
   }
-  const auto told = [&](const std::string& what, SourceLocation at) {
+  const auto mismatch = [&](const std::string& what, SourceLocation at) {
     return Error{"a morph needs models of the same structure, but " + what + " in " + stop.name +
                      "; put both into one model and change the levels of its outputs, as "
                      "SixStructures does",
@@ -95,23 +95,24 @@ std::optional<Error> differs(const Network& base, const MorphStop& stop) {
     const Macro& here = base.macros[i];
     const Macro& there = stop.network->macros[i];
     if (here.kind != there.kind) {
-      return told(quoted(here.name) + " is of another kind", here.location);
+      return mismatch(quoted(here.name) + " is of another kind", here.location);
     }
     if (here.length != there.length || here.width != there.width) {
       const auto size = [](const Macro& macro) {
         return std::to_string(macro.length) +
                (macro.width > 1 ? " by " + std::to_string(macro.width) : "");
       };
-      return told(quoted(here.name) + " has " + size(here) + " nodes, not " + size(there) + ", as",
-                  here.location);
+      return mismatch(
+          quoted(here.name) + " has " + size(here) + " nodes, not " + size(there) + ", as",
+          here.location);
     }
   }
   const auto counts = [&](const auto& here, const auto& there, const char* what) {
     return here.size() == there.size()
                ? std::nullopt
-               : std::optional(told("there are " + std::to_string(here.size()) + " " + what +
-                                        ", not " + std::to_string(there.size()) + ", as",
-                                    {}));
+               : std::optional(mismatch("there are " + std::to_string(here.size()) + " " + what +
+                                            ", not " + std::to_string(there.size()) + ", as",
+                                        {}));
   };
   for (auto wrong :
        {counts(a.macros, b.macros, "strings, meshes and bodies"),
@@ -123,10 +124,10 @@ std::optional<Error> differs(const Network& base, const MorphStop& stop) {
   }
   for (std::size_t i = 0; i < a.links.size(); ++i) {
     if (!(a.links[i] == b.links[i])) {
-      return told("a link has another law or other ends than", base.links[i].location);
+      return mismatch("a link has another law or other ends than", base.links[i].location);
     }
   }
-  return told("other elements are fixed, driven or heard, or start elsewhere, than", {});
+  return mismatch("other elements are fixed, driven or heard, or start elsewhere, than", {});
 }
 
 Formula combined(Formula a, const Formula& b, Op op) {

@@ -51,8 +51,8 @@ class NumberCheck {
     }
     for (const BodyMode& mode : network_.modes) {
       check(mode, {{"frequency", mode.frequency_hz}, {"T60", mode.t60_s}});
-      look_above_zero(mode);
-      look_in_range(mode);
+      check_above_zero(mode);
+      check_in_range(mode);
     }
     for (const Link& link : network_.links) {
       for (const ArgumentId argument : link.arguments) {
@@ -85,40 +85,40 @@ class NumberCheck {
       const bool is_wrong = is_wrong_[asked.argument];
       const bool divides = asked.quantity == "mass" || asked.quantity == "impedance";
       if (is_wrong || (divides && is_nothing_[asked.argument])) {
-        error_ = {
-            told(asked, std::string(element.name), is_wrong ? " is not finite" : " is not above 0"),
-            element.location.line, element.location.column};
+        error_ = {message(asked, std::string(element.name),
+                          is_wrong ? " is not finite" : " is not above 0"),
+                  element.location.line, element.location.column};
       }
     }
   }
 
   // Checks that the frequency and T60 of a mode are above 0.
-  void look_above_zero(const BodyMode& mode) {
+  void check_above_zero(const BodyMode& mode) {
     for (const Asked& asked : {Asked{"frequency", mode.frequency_hz}, Asked{"T60", mode.t60_s}}) {
       if (!error_ && !(argument_value(network_, asked.argument, parameters_) > 0.0)) {
-        error_ = {told(asked, std::string(mode.name), " is not above 0"), mode.location.line,
+        error_ = {message(asked, std::string(mode.name), " is not above 0"), mode.location.line,
                   mode.location.column};
       }
     }
   }
 
   // Checks that the stiffness of a mode is finite.
-  void look_in_range(const BodyMode& mode) {
+  void check_in_range(const BodyMode& mode) {
     const double hz = argument_value(network_, mode.frequency_hz, parameters_);
     const double t60_s = argument_value(network_, mode.t60_s, parameters_);
     const double mass = argument_value(network_, network_.macros[mode.macro].mass, parameters_);
-    const auto look_at = [&](const Asked& asked, double root, std::string_view what) {
+    const auto check_size = [&](const Asked& asked, double root, std::string_view what) {
       if (!error_ && !std::isfinite(grown_ * mass * root * root)) {
-        error_ = {told(asked, std::string(mode.name), what), mode.location.line,
+        error_ = {message(asked, std::string(mode.name), what), mode.location.line,
                   mode.location.column};
       }
     };
-    look_at({"frequency", mode.frequency_hz}, hz, " is too high");
-    look_at({"T60", mode.t60_s}, 1.0 / t60_s, " is too short");
+    check_size({"frequency", mode.frequency_hz}, hz, " is too high");
+    check_size({"T60", mode.t60_s}, 1.0 / t60_s, " is too short");
   }
 
   // "the argument 1/P of 'r' is not finite when P = 0"
-  std::string told(const Asked& asked, const std::string& name, std::string_view what) const {
+  std::string message(const Asked& asked, const std::string& name, std::string_view what) const {
     const Formula& formula = network_.arguments[asked.argument];
     std::vector<std::string> names;
     for (const Parameter& parameter : network_.parameters) {

@@ -101,16 +101,17 @@ std::string open_edges(const Surface& surface, const std::vector<EdgeUse>& edges
     }
     i = end;
   }
-  const auto told = [](std::size_t count, const char* what, const std::string& list) {
+  const auto describe = [](std::size_t count, const char* what, const std::string& list) {
     return count == 0 ? std::string()
                       : std::to_string(count) + (count == 1 ? " edge" : " edges") + what + list +
                             (count > shown_edges
                                  ? "\n  and " + std::to_string(count - shown_edges) + " more"
                                  : "");
   };
-  const std::string first = told(open_count, " with a triangle on one side only, in metres:", open);
+  const std::string first =
+      describe(open_count, " with a triangle on one side only, in metres:", open);
   const std::string second =
-      told(crowded_count, " with more than two triangles, in metres:", crowded);
+      describe(crowded_count, " with more than two triangles, in metres:", crowded);
   return first + (first.empty() || second.empty() ? "" : "\n") + second;
 }
 

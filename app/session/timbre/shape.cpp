@@ -31,7 +31,7 @@ std::string_view unit_of(TargetFigure figure) {
   return {};
 }
 
-std::string told(TargetFigure figure, double value) {
+std::string figure_text(TargetFigure figure, double value) {
   const std::string_view ending = unit_of(figure);
   const std::string unit = ending.empty()    ? ""
                            : ending == "_hz" ? " Hz"
@@ -124,7 +124,7 @@ std::vector<StrikePulse> blows_of(const ShapeRequest& request) {
 }
 
 // Returns "a blow of 0.3 ms at in1", or "blows at in1 and 5 more".
-std::string told(const std::vector<StrikePulse>& blows, const Network& network) {
+std::string describe_strikes(const std::vector<StrikePulse>& blows, const Network& network) {
   const std::string first = " at in" + std::to_string(network.inputs[blows[0].input].number);
   if (blows.size() > 1) {
     return "blows" + first + " and " + std::to_string(blows.size() - 1) + " more";
@@ -203,7 +203,7 @@ Result<Shaped> shape_timbre(const ShapeRequest& request, std::vector<TimbreTarge
     options.key_hz = key_hz(preset, request.key);
     shaped.of += ", key " + std::to_string(request.key) + " (" + note_name(*options.key_hz) + ")";
   }
-  shaped.of += ", " + told(options.blows, scene.network) + " heard at all outputs";
+  shaped.of += ", " + describe_strikes(options.blows, scene.network) + " heard at all outputs";
   const Network network = with_fixed(scene.network, preset);
   StruckModel model(network, options);
   shaped.targets = targets;
@@ -254,7 +254,7 @@ std::vector<std::string> missed(const Shaped& shaped) {
     const TargetFigure figure = shaped.targets[t].figure;
     const double reached = *shaped.found.reached[static_cast<std::size_t>(figure)];
     const std::string word(noticed < 0.0 ? row_of(figure).more : row_of(figure).less);
-    lines.push_back(told(figure, reached) + " is as " + word + " as it gets" +
+    lines.push_back(figure_text(figure, reached) + " is as " + word + " as it gets" +
                     (shaped.targets.size() > 1 ? " with the other targets" : "") + ": " + why);
   }
   return lines;
@@ -264,14 +264,14 @@ std::string to_text(const Shaped& shaped) {
   std::vector<std::vector<std::string>> rows{{"figure", "before", "asked", "reached", "off"}};
   const auto value = [](TargetFigure figure, const TargetValues& values) {
     const auto one = values[static_cast<std::size_t>(figure)];
-    return one ? told(figure, *one) : std::string("-");
+    return one ? figure_text(figure, *one) : std::string("-");
   };
   for (const TargetFigureRow& row : target_figure_rows()) {
     std::vector<std::string> cells{short_name(row.figure), value(row.figure, shaped.found.before),
                                    "", value(row.figure, shaped.found.reached), ""};
     for (std::size_t t = 0; t < shaped.targets.size(); ++t) {
       if (shaped.targets[t].figure == row.figure) {
-        cells[2] = told(row.figure, shaped.targets[t].value);
+        cells[2] = figure_text(row.figure, shaped.targets[t].value);
         cells[4] = fixed(std::fabs(shaped.found.noticed[t]), 2) + " JND";
       }
     }

@@ -105,7 +105,7 @@ const Word attack{"", 0.01, 0.1, "struck", "soft", "slow", "", "", 1, " ms", "th
 const Word decay{"", 0.3, 2.0, "short", "neither short nor long", "long",
                  "", "",  2,   " s",    "the T60 of its decay"};
 
-std::string told(const Word& word, double value) {
+std::string figure_text(const Word& word, double value) {
   constexpr double most = 1e5;  // larger numbers are inaudible
   return (value > most ? "over " : "") +
          with_commas(std::min(value, most), value < 1000.0 ? word.digits : 0) +
@@ -116,7 +116,7 @@ std::string sentence(const Word& word, double value, double shown) {
   const std::string_view name = value < word.low    ? word.below
                                 : value < word.high ? word.between
                                                     : word.above;
-  return std::string(name) + ": " + told(word, shown) + ", " + std::string(word.what);
+  return std::string(name) + ": " + figure_text(word, shown) + ", " + std::string(word.what);
 }
 
 }  // namespace
@@ -169,8 +169,8 @@ std::vector<std::string> timbre_words(const FigureValues& now,
     const double value = *now[figure];
     if (was && std::fabs(value - *was) > noticed * std::fabs(*was)) {
       lines.push_back(std::string(value < *was ? word.shrunk : word.grown) + ": " +
-                      told(word, value) + ", " + std::string(word.what) + "; was " +
-                      told(word, *was));
+                      figure_text(word, value) + ", " + std::string(word.what) + "; was " +
+                      figure_text(word, *was));
     } else {
       lines.push_back(sentence(word, value, value));
     }

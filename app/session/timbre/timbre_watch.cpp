@@ -72,7 +72,7 @@ void TimbreWatch::work() {
   while (!stop_) {
     if (Clock::now() < until_) {
       lock.unlock();
-      hear();
+      analyse_output();
       lock.lock();
     } else {
       wake_.wait(lock);
@@ -81,7 +81,7 @@ void TimbreWatch::work() {
 }
 
 // Analyses the output until no client listens or the rate changes.
-void TimbreWatch::hear() {
+void TimbreWatch::analyse_output() {
   const double rate_hz = process_.clock.read().rate_hz;
   RecordedChunk chunk;
   while (process_.listening.pop(chunk)) {  // chunks left from the last time

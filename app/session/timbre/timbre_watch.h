@@ -47,7 +47,7 @@ class TimbreWatch {
 
  private:
   void work();
-  void hear();
+  void analyse_output();
 
   Process& process_;
   mutable std::mutex mutex_;  // guards all below

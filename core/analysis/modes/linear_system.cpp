@@ -94,7 +94,7 @@ class SystemMaker {
 
   // Collects the force of every link at a node as a function of the motion of its ends, including
   // the force of a driven input there.
-  void feel(ModalPort& port, std::uint32_t node, double weight) const {
+  void collect_forces(ModalPort& port, std::uint32_t node, double weight) const {
     for (const Link& link : network_.links) {
       const double at = link.a == link.b ? 0.0 : part_of(link.a, node) - part_of(link.b, node);
       if (at != 0.0) {
@@ -116,7 +116,8 @@ class SystemMaker {
       if (input.is_force) {
         add(port.direct, input.mass, step_);  // Gives the same momentum at every rate.
       } else {
-        feel(port, input.mass, 1.0);  // K between the driven input and the rows is symmetric.
+        collect_forces(port, input.mass,
+                       1.0);  // K between the driven input and the rows is symmetric.
       }
     }
     const Output* before = nullptr;
@@ -129,7 +130,7 @@ class SystemMaker {
       const double level = level_value(network_, output, {});
       if (output.is_force) {
         each_share(network_, output.mass, [&](std::uint32_t node, double share) {
-          feel(port, node, level * share / (step_ * step_));
+          collect_forces(port, node, level * share / (step_ * step_));
         });
       } else {
         add(port.direct, output.mass, level);
@@ -180,7 +181,7 @@ SparseMatrix LinearSystem::damping(std::span<const double> factors) const {
   return matrix_of(*this, &ModalSpring::damping, factors);
 }
 
-Network settled(const Network& network, std::span<const double> parameters) {
+Network evaluated(const Network& network, std::span<const double> parameters) {
   Network out = network;
   for (Formula& formula : out.arguments) {
     formula = {{.op = Op::number, .value = evaluate(formula, parameters)}};

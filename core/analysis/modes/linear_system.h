@@ -67,7 +67,7 @@ struct LinearSystem {
 };
 
 // Returns the network with every argument evaluated for these parameters. Places stay.
-Network settled(const Network& network, std::span<const double> parameters);
+Network evaluated(const Network& network, std::span<const double> parameters);
 
 // Makes the system of a network without macros whose arguments are numbers, for steps of `step`
 // samples at 44,100 Hz. Modes of bodies are those of the published scheme if `is_sampled`, else

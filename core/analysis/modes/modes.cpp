@@ -137,7 +137,7 @@ Result<FoundSwings> find_swings(const LinearSystem& system, const ModeOptions& o
 Result<NetworkModes> find_modes(const Network& network, std::span<const double> parameters,
                                 const ModeOptions& options) {
   NetworkModes made;
-  made.network = settled(expand_macros(network), parameters);
+  made.network = evaluated(expand_macros(network), parameters);
   made.system = make_linear_system(made.network, scheme_step(options),
                                    options.scheme == ModeScheme::published, options.key_factor);
   made.key_factor = options.key_factor;

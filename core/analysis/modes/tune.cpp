@@ -40,7 +40,7 @@ class ModeTuner {
       return;
     }
     lines_ = *std::move(lines);
-    const Network expanded = settled(expand_macros(network), parameters);
+    const Network expanded = evaluated(expand_macros(network), parameters);
     system_ =
         make_linear_system(expanded, scheme_step(options), options.scheme == ModeScheme::published);
     of_ = lines_of(network, expanded, system_, lines_);

@@ -343,7 +343,7 @@ class Search {
     if (is_there()) {
       best_ = judge_.polished(*best_);
     }
-    return told(start);
+    return summary(start);
   }
 
  private:
@@ -397,7 +397,7 @@ class Search {
     }
   }
 
-  FoundTimbre told(int starts) {
+  FoundTimbre summary(int starts) {
     FoundTimbre asked;
     asked.starts = starts;
     // The model may be silent at its current parameters.

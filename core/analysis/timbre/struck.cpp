@@ -126,7 +126,7 @@ StruckModel::StruckModel(const Network& network, const StrikeOptions& options)
 // Uses the known shapes if they are exact; near a place, first-order perturbation of the place.
 Result<std::vector<HeardMode>> StruckModel::modes_at(std::span<const double> parameters,
                                                      double factor, const Place& place) {
-  const Network written = settled(network_, parameters);
+  const Network written = evaluated(network_, parameters);
   const ModeOptions how = mode_options(factor);
   const LinearSystem system = make_linear_system(written, scheme_step(how), true, factor);
   if (known_ && system.is_sound) {
@@ -138,7 +138,7 @@ Result<std::vector<HeardMode>> StruckModel::modes_at(std::span<const double> par
     return found_modes(written, parameters, how);
   }
   if (!std::equal(place->begin(), place->end(), known_at_.begin(), known_at_.end())) {
-    if (auto there = found_modes(settled(network_, *place), *place, how); !there) {
+    if (auto there = found_modes(evaluated(network_, *place), *place, how); !there) {
       return there.error();
     }
   }

@@ -38,7 +38,7 @@ struct Passive {
     nodes[node].x += way;
     nodes[node].v += way;
   }
-  void feel(std::uint32_t, V) {}
+  void add_reaction(std::uint32_t, V) {}
 
   V give(std::uint32_t node) const { return node < masses ? all[inverse_mass[node]] : V{}; }
   void push_node(std::uint32_t node, V force) {

@@ -264,7 +264,7 @@ struct Passive {
     shift(ends.a, give(ends.a) * -force);
     shift(ends.b, give(ends.b) * force);
   }
-  void feel(std::uint32_t, T) {}
+  void add_reaction(std::uint32_t, T) {}
 
   const T* body(std::uint32_t end) const { return s.bodies + tables.passive_ends[end].place; }
   T give(std::uint32_t end) const {

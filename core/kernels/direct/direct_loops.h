@@ -154,7 +154,7 @@ struct Passive {
     s.shift(node, way);
     s.v[node] += way;
   }
-  void feel(std::uint32_t node, V force) {
+  void add_reaction(std::uint32_t node, V force) {
     if (s.state.felt != nullptr) {
       reinterpret_cast<V*>(s.state.felt)[node] += force;
     }
@@ -171,7 +171,7 @@ struct Passive {
       if (node < program.moving) {
         shift(node, inverse_mass(node) * force);
       }
-      return feel(node, force);
+      return add_reaction(node, force);
     }
     push_place(node, force);
   }
@@ -191,7 +191,7 @@ struct Passive {
       const V way = inverse_mass(at) * part;
       s.x[at] += way;
       s.v[at] += way;
-      feel(at, part);
+      add_reaction(at, part);
     });
   }
 

@@ -432,7 +432,7 @@ struct Passive {
     shift(ends.b, force * give(ends.b));
   }
   void shift(std::uint32_t slot, T way) { move(s, slot, way, way); }
-  void feel(std::uint32_t, T) {}
+  void add_reaction(std::uint32_t, T) {}
   T give(std::uint32_t slot) const {
     const std::uint32_t inverse_mass = s.state.inverse_mass[slot];
     return inverse_mass == grid_fixed ? T(0) : coefficients()[inverse_mass];

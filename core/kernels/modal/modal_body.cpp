@@ -42,7 +42,7 @@ class BodyMaker {
   }
 
   std::optional<LinearBody> make() {
-    look_at_parameters();
+    find_live_coefficients();
     if (program_.link_runs.size() > most_runs || has_sliding_ground() || has_moving_place() ||
         !weigh_masses()) {
       return std::nullopt;
@@ -55,7 +55,7 @@ class BodyMaker {
   }
 
  private:
-  void look_at_parameters() {
+  void find_live_coefficients() {
     body_.is_live.assign(program_.coefficients.size(), false);
     for (const auto& depending : program_.depending) {
       for (const std::uint32_t c : depending) {

@@ -62,7 +62,7 @@ class ModesFinder {
     if (!eigenmodes.measure(stiffness_, progress_) || !eigenmodes.measure(damping_, progress_)) {
       return std::nullopt;
     }
-    settle(eigenmodes);
+    choose_origin(eigenmodes);
     place_pushes();
     place_holds();
     place_outputs();
@@ -117,7 +117,7 @@ class ModesFinder {
 
   // Chooses the origin of q: the equilibrium of all springs, or the start for modes without
   // springs.
-  void settle(const Eigenmodes& eigenmodes) {
+  void choose_origin(const Eigenmodes& eigenmodes) {
     Vector position(count_);
     Vector velocity(count_);
     for (std::uint32_t i = 0; i < count_; ++i) {

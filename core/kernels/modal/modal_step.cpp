@@ -45,7 +45,7 @@ struct ModalPlayer {
       } else if (s.sleep.silence > 0) {
         frames = frames < s.sleep.until_check || is_held() ? frames : s.sleep.until_check;
         play_steady(at, frames);
-        settle(at + frames - 1, frames);
+        put_modes_to_sleep(at + frames - 1, frames);
       } else {
         play_steady(at, frames);
       }
@@ -54,7 +54,7 @@ struct ModalPlayer {
   }
 
   // Puts modes to sleep if no input and no link acts after frame `last`.
-  void settle(std::size_t last, std::size_t frames) {
+  void put_modes_to_sleep(std::size_t last, std::size_t frames) {
     s.sleep.until_check -=
         frames < s.sleep.until_check ? static_cast<std::uint32_t>(frames) : s.sleep.until_check;
     if (s.sleep.until_check > 0) {
@@ -163,7 +163,7 @@ struct ModalPlayer {
   void play_bound(std::size_t first, std::size_t frames) {
     locate_places();
     choose_rows<Moving>();
-    if (presses()) {
+    if (has_passive_links()) {
       measure_passive();
     }
     s.passive.shoves_later = !Moving && may_shove_later();
@@ -179,11 +179,11 @@ struct ModalPlayer {
         }
         mix_forces();
         fill_amplitudes(n);
-        if (presses()) {
+        if (has_passive_links()) {
           measure_passive();
         }
       }
-      if (presses()) {
+      if (has_passive_links()) {
         remember_passive();
       }
       std::fill_n(s.ends.exerted, places + modes.ends.size(), T(0));
@@ -191,9 +191,9 @@ struct ModalPlayer {
       move_modes(n);
       move_places();
       move_ends(n);
-      s.passive.is_pushed = presses() && press();
-      acts |= act() || s.passive.is_pushed;
-      hear(n);
+      s.passive.is_pushed = has_passive_links() && solve_passive_links();
+      acts |= compute_plain_links() || s.passive.is_pushed;
+      read_outputs(n);
     }
     shove_now();
     s.ends.kick_norm = 0;
@@ -291,7 +291,7 @@ struct ModalPlayer {
   }
 
   // Computes the forces of plain links for the next sample. Returns whether any is not 0.
-  bool act() {
+  bool compute_plain_links() {
     bool acts = false;
     const Ends* ends = s.held.ends;
     const T* give = s.held.give;
@@ -318,7 +318,7 @@ struct ModalPlayer {
     return acts;
   }
 
-  void hear(std::size_t n) {
+  void read_outputs(std::size_t n) {
     std::size_t force = 0;
     for (std::size_t o = 0; o < outputs; ++o) {
       const ModalOutput& output = modes.outputs[o];
@@ -620,17 +620,17 @@ struct ModalPlayer {
   }
 
   void hold_all() {
-    hold_if([](const LinkRun&, std::uint32_t, std::uint32_t) { return true; });
+    choose_links([](const LinkRun&, std::uint32_t, std::uint32_t) { return true; });
   }
   void hold_some(std::size_t first, std::size_t frames, T norm) {
-    hold_if([&](const LinkRun& run, std::uint32_t a, std::uint32_t b) {
+    choose_links([&](const LinkRun& run, std::uint32_t a, std::uint32_t b) {
       return (a < places && s.ends.force[a] != 0) || (b < places && s.ends.force[b] != 0) ||
              may_act_within(run, a, b, first, frames, norm);
     });
   }
   // Chooses the links to compute and the places that they need.
   template <class Condition>
-  void hold_if(Condition&& condition) {
+  void choose_links(Condition&& condition) {
     std::fill_n(s.held.row_of, places, nowhere);
     s.held.links = 0;
     s.held.all_links = 0;
@@ -683,14 +683,14 @@ struct ModalPlayer {
   // --- passive links
   // -------------------------------------------------------------------------------
 
-  bool presses() const { return !s.passive.active->links.empty(); }
+  bool has_passive_links() const { return !s.passive.active->links.empty(); }
 
   // Returns whether the displacements by passive links may be added in the next sample's sweep.
   // This requires that the sweep has no other kicks and that nothing reads the modes before it.
   bool may_shove_later() const {
     const bool is_all = std::all_of(s.held.count_of, s.held.count_of + modes.holds.size(),
                                     [](std::uint32_t plain) { return plain == 0; });
-    return presses() && is_all && s.inputs.pushing == 0 && s.forces.count == 0 &&
+    return has_passive_links() && is_all && s.inputs.pushing == 0 && s.forces.count == 0 &&
            s.held.places <= most_kicked;
   }
   // Adds displacements that were deferred.
@@ -719,7 +719,7 @@ struct ModalPlayer {
 
   // Solves the passive links after everything else has moved. Moves places, outputs and modes by
   // their forces. Returns whether any force is not 0.
-  bool press() {
+  bool solve_passive_links() {
     const T w = inverse_mass();
     T* row = s.passive.memory;
     for (const PassiveLink& link : s.passive.active->links) {

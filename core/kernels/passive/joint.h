@@ -54,7 +54,7 @@ class JointBody {
   virtual V coupling(Ends one, Ends other) const = 0;
   virtual void push(Ends ends, V force) = 0;
   virtual void shift(std::uint32_t node, V way) = 0;
-  virtual void feel(std::uint32_t node, V force) = 0;
+  virtual void add_reaction(std::uint32_t node, V force) = 0;
   virtual V give(std::uint32_t from, std::uint32_t at) const = 0;
   virtual void push_node(std::uint32_t node, V force) = 0;
 
@@ -127,9 +127,9 @@ class JointOf final : public JointBody<V> {
       body_.shift(node, way);
     }
   }
-  void feel([[maybe_unused]] std::uint32_t node, [[maybe_unused]] V force) override {
+  void add_reaction([[maybe_unused]] std::uint32_t node, [[maybe_unused]] V force) override {
     if constexpr (HasMasses<Body, V>) {
-      body_.feel(node, force);
+      body_.add_reaction(node, force);
     }
   }
   V give([[maybe_unused]] std::uint32_t from, [[maybe_unused]] std::uint32_t at) const override {

@@ -118,7 +118,7 @@ class ByEnds {
         at_[end] = V{};
       }
       if ((is_mass(end) || end == no_mass) && any_of(force != V{})) {
-        body.feel(node, force);
+        body.add_reaction(node, force);
       }
     };
     for (std::size_t i = 0; i < cluster_.count; ++i) {

@@ -20,7 +20,7 @@ namespace {
 //                                         released, else 1
 // If masses are nodes of their own:
 //  void shift(node, V way)                moves one of them
-//  void feel(node, V force)               adds a force to an output of the node's force
+//  void add_reaction(node, V force)               adds a force to an output of the node's force
 // And if there are places:
 //  V give(from, at)                       displacement of a node by a unit force on another
 //  void push_node(node, V force)          moves one end only

@@ -135,7 +135,7 @@ class WebStep {
       if (web_.inverse_mass[i] != no_mass) {
         body_.shift(end, give_[i] * on_it);
       }
-      body_.feel(end, on_it);
+      body_.add_reaction(end, on_it);
     }
   }
 

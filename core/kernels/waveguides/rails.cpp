@@ -102,7 +102,7 @@ void Rails<T>::prepare(const T* coefficients) {
       if (is_silent || (guide.fading == 0 && is_new(guide, lane, coefficients))) {
         design(guide, lane, coefficients);
         guide.is_run_known = false;
-        is_silent ? settle(guide, lane) : void(fades = true);
+        is_silent ? jump_to_design(guide, lane) : void(fades = true);
       }
     }
     guide.fading = fades ? waveguide_fade_frames : guide.fading;
@@ -181,7 +181,7 @@ void Rails<T>::design(Guide& guide, std::size_t lane, const T* coefficients) {
 
 // Without a fade, because the lane is silent.
 template <class T>
-void Rails<T>::settle(Guide& guide, std::size_t lane) {
+void Rails<T>::jump_to_design(Guide& guide, std::size_t lane) {
   const std::size_t at = guide.row + lane;
   end[at] = next_end[at];
   allpass[at] = next_allpass[at];

@@ -102,7 +102,7 @@ class Rails {
  private:
   bool is_new(const Guide& guide, std::size_t lane, const T* coefficients) const;
   void design(Guide& guide, std::size_t lane, const T* coefficients);
-  void settle(Guide& guide, std::size_t lane);
+  void jump_to_design(Guide& guide, std::size_t lane);
   std::uint32_t longest_run(const Guide& guide, const T* coefficients);
 
   const Program& program_;

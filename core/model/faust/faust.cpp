@@ -173,7 +173,7 @@ bool exerts_at_start(const Network& network, const Link& link, const LawFacts& l
            law.gap(numbers, start.position - start.speed) >= 0.0);
 }
 
-bool gives_way(const Network& network, std::uint32_t mass) {
+bool is_movable(const Network& network, std::uint32_t mass) {
   return moves(network.masses[mass]) || is_junction(network, mass);
 }
 
@@ -228,7 +228,7 @@ class FaustPassive {
         is_held_[end] = true;
         each_behind(network, end, [&](std::uint32_t mass) {
           is_held_[mass] = true;  // the fixed ends of macros too
-          if (!gives_way(network, mass)) {
+          if (!is_movable(network, mass)) {
             return;
           }
           if (holder[mass] != none && holder[mass] != i) {
@@ -322,7 +322,7 @@ class FaustPassive {
     std::vector<std::string> sum;
     for (const FaustShare& pushed : behind(from)) {
       for (const FaustShare& felt : behind(at)) {
-        if (pushed.node == felt.node && gives_way(network_, felt.node)) {
+        if (pushed.node == felt.node && is_movable(network_, felt.node)) {
           sum.push_back("+ " + pushed.factor + felt.factor + terms.inverse_mass(felt.node));
         }
       }

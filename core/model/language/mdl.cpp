@@ -461,16 +461,17 @@ bool ParsedNetwork::ok() const {
 
 // Messages about a translated line point to the whole line that it came from.
 static ParsedNetwork read_synth_a_modeler(std::string_view text, ReadOptions options) {
-  Translation told = translate_synth_a_modeler(text, options.progress);
-  ParsedNetwork parsed{.network = {}, .diagnostics = std::move(told.diagnostics), .motion = {}};
+  Translation translation = translate_synth_a_modeler(text, options.progress);
+  ParsedNetwork parsed{
+      .network = {}, .diagnostics = std::move(translation.diagnostics), .motion = {}};
   if (parsed.ok()) {
     if (!options.third) {
       options.third = ThirdArgument::velocity_per_second;
       options.third_by = "Synth-A-Modeler has it";
     }
-    ParsedNetwork read = Reader(told.origins).read(told.text, options);
+    ParsedNetwork read = Reader(translation.origins).read(translation.text, options);
     std::unordered_map<int, const Origin*> origins;
-    for (const Origin& origin : told.origins) {
+    for (const Origin& origin : translation.origins) {
       origins.emplace(origin.line, &origin);
     }
     for (Diagnostic& diagnostic : read.diagnostics) {
