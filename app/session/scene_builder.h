@@ -85,7 +85,7 @@ class SceneBuilder {
   Timings recalled_{.time = {},  // results of earlier measurements
                     .recall = [this](const std::string& key) { return wisdom_.recall(key); },
                     .keep = {}};
-  Timings timings_{.time = options_.time,  // the same, and of new ones
+  Timings timings_{.time = options_.time,  // results of earlier and new measurements
                    .recall = recalled_.recall,
                    .keep = [this](const std::string& key, double ns) { wisdom_.keep(key, ns); }};
 };

@@ -65,8 +65,7 @@ function complain(text) {
   while (list.children.length > 30) list.lastChild.remove();
 }
 
-// --- the current model
-// -----------------------------------------------------------------------------
+// --- the current model --------------------------------------------------------------------------
 
 const view = new NetworkView($('network'));
 let model = null, status = {}, picture = 0, isFetching = false;

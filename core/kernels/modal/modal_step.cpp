@@ -518,8 +518,7 @@ struct ModalPlayer {
     }
   }
 
-  // --- links
-  // ---------------------------------------------------------------------------------------
+  // --- links ------------------------------------------------------------------------------------
 
   void wake() {
     if (s.sleep.awake < modes.modes) {
@@ -680,8 +679,7 @@ struct ModalPlayer {
     s.passive.active->links.back().ends = {link, nowhere};
   }
 
-  // --- passive links
-  // -------------------------------------------------------------------------------
+  // --- passive links ----------------------------------------------------------------------------
 
   bool has_passive_links() const { return !s.passive.active->links.empty(); }
 
@@ -789,8 +787,7 @@ struct ModalPlayer {
     }
   }
 
-  // --- coefficients
-  // --------------------------------------------------------------------------------
+  // --- coefficients -----------------------------------------------------------------------------
 
   T coefficient(std::uint32_t c) const { return s.ramps.value[c]; }
   T inverse_mass() const {

@@ -24,8 +24,7 @@ namespace {
 constexpr double rate_hz = 48000.0;
 constexpr std::size_t period = 256;
 
-// --- a client, and a process driven by the test
-// ---------------------------------------------------
+// --- a client, and a process driven by the test -------------------------------------------------
 
 std::unique_ptr<OscServer> open_server(Process& process, Session& session) {
   auto server = OscServer::open({.port = 0}, process, session, {});

@@ -304,8 +304,7 @@ TEST_CASE("voices in neighbouring lanes do not affect each other", "[direct]") {
   }
 }
 
-// --- golden values of the published laws
-// -------------------------------------------------
+// --- golden values of the published laws --------------------------------------------------------
 
 namespace {
 
@@ -448,8 +447,7 @@ TEST_CASE("golden values of appendix A, current laws", "[direct]") {
                 {2000, "0.00518850612"}});
 }
 
-// --- sample values, from an independent simulation
-// ---------------------------------------------------------------
+// --- sample values, from an independent simulation ----------------------------------------------
 
 namespace {
 

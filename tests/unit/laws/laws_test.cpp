@@ -127,7 +127,7 @@ TEST_CASE("the slopes of every law reach their bounds and do not exceed them", "
               by_v <= most.damping + most.stiff_damping + rounding &&
               by_d + 2.0 * by_v <= most.pull + 2.0 * most.damping + rounding)) {
           CAPTURE(d, v, by_d, by_v, most.stiffness, most.damping, most.pull);
-          FAIL("steeper than it says");
+          FAIL("steeper than its bound");
         }
       }
       // A clipped law is steepest at a single point, which random points miss. For a law with

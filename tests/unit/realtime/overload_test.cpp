@@ -102,8 +102,7 @@ Played played(std::size_t blocks, double fixed, double each) {
 
 }  // namespace
 
-// --- order of stealing
-// -------------------------------------------------------------------------------
+// --- order of stealing --------------------------------------------------------------------------
 
 TEST_CASE("an engine keeps the loudest held voices and the newest", "[overload]") {
   // The newest voice is the quietest; the loudest is released.
@@ -148,8 +147,7 @@ TEST_CASE("an engine keeps the loudest held voices and the newest", "[overload]"
   CHECK(player.heap_calls == 0);
 }
 
-// --- voice limit
-// ------------------------------------------------------------------------------------
+// --- voice limit --------------------------------------------------------------------------------
 
 TEST_CASE("the mean covers a second, and the lasting load is the median of five spans",
           "[overload]") {
@@ -222,8 +220,7 @@ TEST_CASE("after a second of low load more voices may sound, by their cost", "[o
   CHECK(load.limit() == 0);
 }
 
-// --- in the audio thread
-// -------------------------------------------------------------------------
+// --- in the audio thread ------------------------------------------------------------------------
 
 TEST_CASE("an overloaded process steals voices, reports it once, and recovers", "[overload]") {
   Harness harness;
@@ -304,8 +301,7 @@ TEST_CASE("without a clock the load is not measured and no voice is stolen", "[o
   CHECK(harness.process.meters().cpu_peak == 0.0);
 }
 
-// --- messages
-// --------------------------------------------------------------------------------
+// --- messages -----------------------------------------------------------------------------------
 
 TEST_CASE("the warning about a plan too large for one core says how many voices fit",
           "[overload]") {

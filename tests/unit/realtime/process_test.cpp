@@ -15,8 +15,7 @@ double old_gain(std::size_t n) {
 
 }  // namespace
 
-// --- events
-// ---------------------------------------------------------------------------------------
+// --- events -------------------------------------------------------------------------------------
 
 TEST_CASE("without a model there is silence", "[process]") {
   Harness harness(true, 2);
@@ -117,8 +116,7 @@ TEST_CASE("events act in order of arrival, and rejected ones are counted", "[pro
   CHECK(harness.process.meters().dropped == 10);
 }
 
-// --- models that change
-// ---------------------------------------------------------------------------
+// --- models that change -------------------------------------------------------------------------
 
 TEST_CASE("two models crossfade linearly over 50 ms", "[process]") {
   for (const std::size_t block : {32u, 441u, 512u, 3000u}) {
@@ -261,8 +259,7 @@ TEST_CASE("an early offer waits, and a replaced offer is returned", "[process]")
   delete second;
 }
 
-// --- output
-// -------------------------------------------------------------------------------
+// --- output -------------------------------------------------------------------------------------
 
 TEST_CASE("the block length does not change the limiter's output", "[process]") {
   Preset loud = struck(4);
