@@ -247,7 +247,7 @@ std::string conclusion(const Scene& scene, const Proved& proved) {
 void print_report(const Scene& scene, const Compiled& compiled, const Proved& proved) {
   const Instrument& instrument = compiled.instrument;
   std::printf("%s: %s, %s, %s, %s\n", scene.path.c_str(),
-              counted(instrument.masses, "mass that moves", "masses that move").c_str(),
+              counted(instrument.masses, "moving mass", "moving masses").c_str(),
               counted(instrument.links, "link", "links").c_str(),
               counted(instrument.inputs.size(), "input", "inputs").c_str(),
               counted(static_cast<std::size_t>(instrument.outputs), "output", "outputs").c_str());

@@ -176,7 +176,8 @@ std::vector<const Row*> command_rows() {
 }
 
 std::string_view heading(CommandGroup group) {
-  constexpr std::string_view headings[] = {"Models", "Playing", "Parameters", "Looking", "Other"};
+  constexpr std::string_view headings[] = {"Models", "Playing", "Parameters", "Information",
+                                           "Other"};
   return headings[static_cast<std::size_t>(group)];
 }
 

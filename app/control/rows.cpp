@@ -385,6 +385,7 @@ std::vector<Row> make_rows() {
        .command = "tune",
        .group = CommandGroup::parameters,
        .words = "MODE NOTE|HZ [T60] [PART]",
+       .command_does = "tunes a mode to a pitch and a decay",
        .details =
            "Scales the stiffness, and with a T60 in seconds the damping, of the whole model, or "
            "of the part\nconnected to the mass, string, mesh or link PART. 'modes' lists "

@@ -103,7 +103,7 @@ class Chooser {
       return std::nullopt;
     }
     apply_measurements();
-    return take("for its highest keys");
+    return take("chosen for the highest keys");
   }
   bool may_gain() const { return may_gain_; }
 

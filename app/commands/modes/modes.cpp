@@ -48,7 +48,7 @@ Result<Done> tune(Scene& scene, const std::vector<double>& parameters, const Mod
 void print_modes(const Scene& scene, const KnownModes& modes) {
   std::printf("%s: %s%s of %s, %s\n", scene.path.c_str(), modes.is_all ? "" : "the lowest ",
               counted(modes.modes.size(), "mode", "modes").c_str(),
-              counted(modes.masses, "mass that moves", "masses that move").c_str(),
+              counted(modes.masses, "moving mass", "moving masses").c_str(),
               modes.scheme == ModeScheme::published
                   ? ("in the published scheme at " + fixed(modes.rate_hz, 0) + " Hz").c_str()
                   : "in the continuous network");

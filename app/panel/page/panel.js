@@ -288,7 +288,7 @@ function showLimits() {
 // --- modes ---------------------------------------------------------------------------------------------
 
 $('find-modes').addEventListener('click', async () => {
-  $('modes-text').textContent = 'Looking for the modes…';
+  $('modes-text').textContent = 'Searching for the modes…';
   try {
     const found = await json('/modes?count=24');
     const of = serial;
@@ -311,8 +311,11 @@ $('find-modes').addEventListener('click', async () => {
       item.append(button);
       return item;
     }));
-    if (!found.modes.length) $('modes-text').textContent = 'Nothing swings.';
-  } catch (error) { $('modes-text').textContent = error.message; }
+    if (!found.modes.length)
+      $('modes-text').textContent = 'Nothing swings.';
+  } catch (error) {
+    $('modes-text').textContent = error.message;
+  }
 });
 
 // --- the library ---------------------------------------------------------------------------------------

@@ -123,14 +123,14 @@ std::vector<StrikePulse> blows_of(const ShapeRequest& request) {
   return blows.empty() ? std::vector<StrikePulse>{{}} : blows;
 }
 
-// Returns "a blow of 0.3 ms at in1", or "blows at in1 and 5 more".
+// Returns "a strike of 0.3 ms at in1", or "strikes at in1 and 5 more".
 std::string describe_strikes(const std::vector<StrikePulse>& blows, const Network& network) {
   const std::string first = " at in" + std::to_string(network.inputs[blows[0].input].number);
   if (blows.size() > 1) {
-    return "blows" + first + " and " + std::to_string(blows.size() - 1) + " more";
+    return "strikes" + first + " and " + std::to_string(blows.size() - 1) + " more";
   }
   const double ms = 1e3 * blows[0].length_s;
-  return "a blow" + (ms > 0.0 ? " of " + fixed(ms, 2) + " ms" : "") + first;
+  return "a strike" + (ms > 0.0 ? " of " + fixed(ms, 2) + " ms" : "") + first;
 }
 
 double key_hz(const Preset& preset, int key) {
@@ -203,7 +203,7 @@ Result<Shaped> shape_timbre(const ShapeRequest& request, std::vector<TimbreTarge
     options.key_hz = key_hz(preset, request.key);
     shaped.of += ", key " + std::to_string(request.key) + " (" + note_name(*options.key_hz) + ")";
   }
-  shaped.of += ", " + describe_strikes(options.blows, scene.network) + " heard at all outputs";
+  shaped.of += ", " + describe_strikes(options.blows, scene.network) + ", heard at all outputs";
   const Network network = with_fixed(scene.network, preset);
   StruckModel model(network, options);
   shaped.targets = targets;
@@ -261,7 +261,7 @@ std::vector<std::string> missed(const Shaped& shaped) {
 }
 
 std::string to_text(const Shaped& shaped) {
-  std::vector<std::vector<std::string>> rows{{"figure", "before", "asked", "reached", "off"}};
+  std::vector<std::vector<std::string>> rows{{"figure", "before", "target", "reached", "error"}};
   const auto value = [](TargetFigure figure, const TargetValues& values) {
     const auto one = values[static_cast<std::size_t>(figure)];
     return one ? figure_text(figure, *one) : std::string("-");

@@ -72,9 +72,9 @@ double operations(const Program& program, const Batch&, const Workload& load) {
 }
 
 std::string description(const Program& program, const Batch&) {
-  return std::string(program.moving <= most_held_masses ? "its masses in registers"
+  return std::string(program.moving <= most_held_masses ? "masses in registers"
                                                         : "mass by mass and link by link") +
-         ", a voice in each lane of many packs at once";
+         ", one voice per lane, many packs at once";
 }
 
 std::uint64_t voice_bytes(const Program& program, const Batch&, std::uint64_t number_bytes) {

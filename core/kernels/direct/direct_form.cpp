@@ -36,7 +36,7 @@ double operations(const Program& program, const Direct&, const Workload& load) {
 }
 
 std::string description(const Program& program, const Direct&) {
-  const std::string words = "mass by mass and link by link, as published, a voice in each lane";
+  const std::string words = "mass by mass and link by link, as published, one voice per lane";
   return program.waveguides.empty()
              ? words
              : words + "; with " + count_of(program.waveguides.size(), "waveguide", "waveguides");

@@ -28,7 +28,7 @@ double operations(const Program& program, const Oversampled& form, const Workloa
 }
 
 std::string description(const Program&, const Oversampled& form) {
-  return std::to_string(form.times) + " steps a sample, each " + description(*form.fine);
+  return std::to_string(form.times) + " steps a sample: " + description(*form.fine);
 }
 
 std::uint64_t voice_bytes(const Program& program, const Oversampled& form,
