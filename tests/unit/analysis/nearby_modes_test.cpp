@@ -36,7 +36,7 @@ std::vector<double> moved(const Network& network, double by) {
 }
 
 LinearSystem system_of(const Network& network, std::span<const double> values) {
-  return make_linear_system(settled(network, values), 1.0, true);
+  return make_linear_system(evaluated(network, values), 1.0, true);
 }
 
 NearbyModes nearby(const Network& network) {
