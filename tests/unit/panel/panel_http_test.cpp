@@ -268,7 +268,7 @@ TEST_CASE("a packet by HTTP acts like one by UDP", "[panel_http]") {
   CHECK(hears("event: status"));
   CHECK(stage.status(stage.post(message("/model/load", {std::string("no such model")}))) == 200);
   CHECK(hears("event: news"));
-  stage.panel->tell("a \"quoted\"\nline");
+  stage.panel->show_message("a \"quoted\"\nline");
   CHECK(hears(R"(data: "a \"quoted\"\nline")"));
   close(listener);
 }
