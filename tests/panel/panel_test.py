@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The panel as a person has it: the program on a JACK server, its page in a real Chromium.
+"""Tests the panel as people use it: the program on a JACK server, its page in Chromium.
 
   panel_test.py PROGRAM FOLDER [pictures FOLDER [MODEL...]]
 
@@ -22,7 +22,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from browser import Browser  # noqa: E402
 
 SERVER = "ressort-panel"
-PATIENCE_S = 30  # longer than anything but a hang takes
+PATIENCE_S = 30  # only a program that hangs takes longer
 failures = 0
 
 
@@ -96,7 +96,7 @@ class Program:
 
 
 class Frames:
-    """What /motion sends, cut into frames; in a thread of its own."""
+    """The frames that /motion sends, received in a thread."""
 
     def __init__(self, port, hz=30):
         self.frames = []  # (samples played, picture, positions as bytes)
@@ -125,7 +125,7 @@ class Frames:
 
 
 def frame_rate(program, seconds):
-    """25 frames of 598 masses for every second of sound, by the frames' own count of samples."""
+    """Checks for 25 frames of 598 masses per second of sound, by the sample counts in the frames."""
     _, text = program.request("GET", "/describe")
     frames = Frames(program.port)
     rate = 48000
@@ -160,13 +160,13 @@ def centre(browser, selector):
 
 
 def plucks(program, browser):
-    check(silence(program, browser), "it is silent to begin with")
+    check(silence(program, browser), "the panel is silent at first")
     x, y = browser.evaluate(
         "(() => { const v = panel.view, n = v.net.inputs[0][1],"
         " b = v.canvas.getBoundingClientRect(); return [b.x + v.sx[n], b.y + v.sy[n]]; })()")
     browser.mouse("mouseMoved", x, y)
     check(browser.evaluate("document.getElementById('hint').textContent").startswith("input 1"),
-          "the pointer says what it would play")
+          "the hint names the input under the pointer")
     browser.evaluate("globalThis.struck = 0; globalThis.most = 0; (function look() {"
                      " const v = panel.view, n = v.net.inputs[0][1];"
                      " for (let i = 0; i < v.net.dots; i++)"
@@ -208,7 +208,7 @@ def hint(browser):
 
 
 def on_picture(browser, name):
-    """Goes with the pointer to where a mass is drawn, once its picture has found its place."""
+    """Moves the pointer to a mass, once its position in the picture is steady."""
     x = y = None
     for _ in range(50):
         x, y = browser.evaluate(
@@ -223,22 +223,22 @@ def on_picture(browser, name):
 
 
 def strikes(program, browser, names):
-    """What has no input is struck where it is drawn: heard is what it hangs on, 149 or 447 Hz."""
+    """Strikes masses without an input on the picture and compares the pitches: 149 and 447 Hz."""
     tones = {}
     for name, hz in zip(names, (149, 447)):
         check(silence(program, browser), f"silence before {name} is struck")
         x, y = on_picture(browser, name)
-        check(hint(browser).startswith(name), f"the pointer says that it would strike {name}")
+        check(hint(browser).startswith(name), f"the hint says that a click strikes {name}")
         browser.mouse("mousePressed", x, y)
         browser.mouse("mouseMoved", x, y - 60)
         browser.mouse("mouseReleased", x, y - 60)
         check(browser.eventually("panel.status.peak_db > -60"), f"{name} is heard")
-        if "_" in name:  # a pendulum has little else
+        if "_" in name:  # a pendulum has few other frequencies
             check(browser.eventually(f"Math.abs(panel.status.centroid_hz - {hz}) < 30"),
                   f"the centroid is that of {name}")
-        shown = browser.evaluate("panel.frames")  # until the last of them has nothing else
+        shown = browser.evaluate("panel.frames")  # wait until a whole window contains this tone only
         browser.eventually(f"panel.frames > {shown} + 5 && panel.heard.some(v => v !== 0)")
-        # Both masses together swing at sqrt(K/2) per sample, 44 100 of them a second: 149 and 447 Hz.
+        # Both masses together vibrate at sqrt(K/2) per sample, 44 100 of them a second: 149 and 447 Hz.
         tones[name] = browser.evaluate("""[148.9, 446.7].map(hz => {
           const y = panel.heard, w = 2 * Math.PI * hz / 48000;
           let re = 0, im = 0;
@@ -250,14 +250,14 @@ def strikes(program, browser, names):
         })""")
     print("        " + str(tones))
     low, high = (tones[name] for name in names)
-    check(low[0] > 10 * low[1], "the low one sounds low")
-    check(high[1] > 10 * high[0], "the high one sounds high")
+    check(low[0] > 10 * low[1], "the low one is heard at 149 Hz")
+    check(high[1] > 10 * high[0], "the high one is heard at 447 Hz")
 
 
 def swings(browser):
-    """Waveguides swing between their places: a line of points, which the waves move."""
+    """A waveguide is drawn as a line of points, which its waves move."""
     check(browser.evaluate("[...panel.view.net.kinds].filter(k => k === 'w').length") == 66,
-          "each string has its points")
+          "each string is drawn as points")
     check(browser.evaluate("""new Promise(done => {
       const v = panel.view, most = [], until = performance.now() + 5000;
       (function look() {
@@ -280,7 +280,7 @@ MIDDLE = """@s string 31 1. 0.1 0.0002 0. 0.
 
 
 def mirrors(program, browser):
-    """A symmetrical pluck moves what is drawn, and symmetrically, to a pixel's thousandth."""
+    """A symmetrical pluck moves the picture symmetrically, to a thousandth of a pixel."""
     picture = "panel.view.canvas.toDataURL()"
     check(silence(program, browser), "silence before the pluck")
     browser.eventually("panel.view.positions.every((x, i) => Math.abs(x - panel.view.net.start[i]) < 1e-4 * panel.view.peak)", 5)
@@ -309,7 +309,7 @@ def mirrors(program, browser):
     })""")
     print(f"        {found[1]:.1f} pixels high, {found[0]:.5f} pixels from its mirror image")
     check(found[1] > 20, "the picture moves")
-    check(found[0] < 0.01, "and symmetrically")
+    check(found[0] < 0.01, "the picture moves symmetrically")
     check(browser.evaluate(picture) != before, "the canvas has changed")
 
 
@@ -318,7 +318,7 @@ def keys(program, browser):
     browser.evaluate("document.getElementById('network').focus()")
     browser.key("ArrowRight", "ArrowRight")
     browser.key("Enter", "Enter", "\r")
-    check(browser.eventually("panel.status.peak_db > -60"), "an input is played by keys alone")
+    check(browser.eventually("panel.status.peak_db > -60"), "an input can be played with keys only")
     check(silence(program, browser), "silence again")
     before = browser.evaluate("panel.status.notes")
     browser.key("a", "KeyA", "a")
@@ -326,13 +326,13 @@ def keys(program, browser):
     before = browser.evaluate("panel.status.notes")
     browser.mouse("mousePressed", *centre(browser, "#keyboard [data-key=\"60\"]"))
     browser.mouse("mouseReleased", *centre(browser, "#keyboard [data-key=\"60\"]"))
-    check(browser.eventually(f"panel.status.notes === {before} + 1"), "a key of the piano does")
+    check(browser.eventually(f"panel.status.notes === {before} + 1"), "a piano key plays a note")
     # Every control can be reached by Tab, and has a name.
     names = browser.evaluate(
         "[...document.querySelectorAll('button, input, canvas[tabindex]')]"
         ".filter(e => !(e.getAttribute('aria-label') || e.textContent.trim() ||"
         " document.querySelector(`label[for='${e.id}']`)?.textContent)).map(e => e.outerHTML)")
-    check(names == [], f"everything has a name {names or ''}")
+    check(names == [], f"every control has a name {names or ''}")
 
 
 def slides(program, browser):
@@ -341,7 +341,7 @@ def slides(program, browser):
     for _ in range(12):
         browser.key("ArrowRight", "ArrowRight")
     check(eventually(lambda: program.parameter("mesh_Z") > start * 1.01),
-          "a slider of the page turns the parameter")
+          "a slider sets its parameter")
 
     # The page sends changes with a delay, so wait until all have arrived before the next change.
     def has_settled():
@@ -352,27 +352,27 @@ def slides(program, browser):
     program.osc("/param/mesh_Z", 0.03)
     check(browser.eventually(
         "document.querySelector('label[for=\"p-mesh_Z\"] + output').textContent === '0.03'"),
-        "a parameter that another turns moves the slider")
+        "a parameter set by another client moves the slider")
     at = float(browser.evaluate("document.getElementById('p-mesh_Z').value"))
     program.type("set mesh_Z 0.0001")
     check(browser.eventually(f"+document.getElementById('p-mesh_Z').value < {at}"),
-          "and so does the console")
+          "a parameter set at the console moves the slider")
 
 
 def shows_modes(browser):
     browser.evaluate("document.getElementById('find-modes').click()")
     check(browser.eventually("document.querySelectorAll('#modes button').length === 24"),
-          "it lists the modes")
+          "the page lists the modes")
     browser.evaluate("document.querySelector('#modes button').click()")
     check(browser.evaluate("panel.view.mode.length === panel.view.net.dots"),
           "a click shows a mode's shape")
     check(browser.evaluate("document.querySelector('#modes button').textContent")
-          .startswith("99.29 Hz"), "which is the mode that `ressort check` names, 99.29 Hz")
+          .startswith("99.29 Hz"), "the first mode is the one that `ressort check` prints, 99.29 Hz")
     browser.evaluate("document.querySelector('#modes button').click()")
 
 
 def slows_down(program, browser):
-    """A mass in slow motion: how far it goes from one frame to the next is printed."""
+    """Prints how far a mass moves from one frame to the next in slow motion."""
     program.osc("/note/on", 57, 110)
     browser.evaluate("document.getElementById('slow').click()")
     browser.eventually("panel.view.net && panel.status.voices > 0")
@@ -388,12 +388,12 @@ def slows_down(program, browser):
     jumps = jumps[10:]
     most = max(abs(x) for x in jumps)
     steps = sorted(abs(a - b) / most for a, b in zip(jumps, jumps[1:]))
-    print(f"        of what it swings, {100 * steps[len(steps) // 2]:.0f} % from frame to frame")
+    print(f"        of the amplitude, {100 * steps[len(steps) // 2]:.0f} % from frame to frame")
     # The slow motion depends on the number of frames that a busy machine draws, so
     # tests/unit/panel/panel_test measures it.
     check(most > 0 and browser.evaluate(
         "document.getElementById('slow').getAttribute('aria-pressed') === 'true'"),
-        "slow motion goes on and moves")
+        "the picture moves in slow motion")
     browser.evaluate("document.getElementById('slow').click()")
     program.osc("/panic")
 
@@ -428,9 +428,9 @@ def test(program_path):
             slows_down(program, browser)
             loads(program, browser)
             check(browser.complaints() == [],
-                  f"the browser has nothing to complain about {browser.complaints() or ''}")
+                  f"the browser reports no error {browser.complaints() or ''}")
     finally:
-        check(program.close() == 0, "the program ends as it should, with the page still open")
+        check(program.close() == 0, "the program ends normally while the page is open")
         if failures:
             print("the program said:\n" + "".join(program.lines))
 
@@ -449,9 +449,9 @@ def test_model(program_path, text, dots, look):
                          f"the page draws {dots} dots"):
                     look(program, browser)
                 check(browser.complaints() == [],
-                      f"the browser has nothing to complain about {browser.complaints() or ''}")
+                      f"the browser reports no error {browser.complaints() or ''}")
         finally:
-            check(program.close() == 0, "the program ends as it should")
+            check(program.close() == 0, "the program ends normally")
 
 
 def test_strings(program, browser):

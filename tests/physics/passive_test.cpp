@@ -388,7 +388,7 @@ TEST_CASE("every law is finite at tiny distances", "[passive]") {
         const float force = law.passive(state);
         if (!std::isfinite(force)) {
           CAPTURE(Type::facts.name, state.now, state.speed, state.fast, c[0], c[1], c[2]);
-          FAIL("no number");
+          FAIL("the force is not finite");
         }
       }
     });

@@ -238,7 +238,7 @@ Found abuse(Compiled compiled, double seconds, std::uint64_t seed, bool force) {
                   {}, 0);
     for (const std::vector<double>& channel : out) {
       for (const double sample : channel) {
-        found.wrong += std::fabs(sample) <= Limiter::ceiling ? 0 : 1;  // NaN is not either
+        found.wrong += std::fabs(sample) <= Limiter::ceiling ? 0 : 1;  // counts NaN too
         found.peak = std::max(found.peak, std::fabs(sample));
       }
     }

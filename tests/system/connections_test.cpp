@@ -30,7 +30,7 @@ TEST_CASE("An unplugged keyboard is reconnected by its name", "[jack_midi]") {
   }
 }
 
-// Between two updates it goes and comes back, which differs from being unplugged by hand.
+// The keyboard leaves and returns between two updates, unlike a connection that a person removes.
 TEST_CASE("A keyboard that returns at once is reconnected too", "[jack_midi]") {
   const Server server(256);
   Child play(program({"play", click(), "-a", "jack", "-i", "-u", osc_port}));
@@ -39,7 +39,8 @@ TEST_CASE("A keyboard that returns at once is reconnected too", "[jack_midi]") {
   REQUIRE(keyboard->connect("neighbour:keys", "ressort:midi_in"));
   for (int time = 0; time < 4; ++time) {
     INFO("time " << time);
-    std::this_thread::sleep_for(std::chrono::milliseconds(1500 + 17 * time));  // it is noticed
+    std::this_thread::sleep_for(
+        std::chrono::milliseconds(1500 + 17 * time));  // so that the connection is seen
     keyboard.reset();
     keyboard = std::make_unique<Neighbour>();
     REQUIRE(
@@ -122,10 +123,10 @@ TEST_CASE("The program survives the end of its server, or reports it by the exit
     REQUIRE(eventually([&] {
       return neighbour->is_connected(pulled_from_speaker.first, pulled_from_speaker.second);
     }));
-    std::this_thread::sleep_for(500ms);  // noticed
+    std::this_thread::sleep_for(500ms);  // so that the connection is seen
     neighbour->disconnect(pulled.first, pulled.second);
     neighbour->disconnect(pulled_from_speaker.first, pulled_from_speaker.second);
-    std::this_thread::sleep_for(1s);  // judged: not a closing client
+    std::this_thread::sleep_for(1s);  // long enough to see that no client is closing
 
     struct Next {
       int period_frames;

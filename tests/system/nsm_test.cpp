@@ -129,11 +129,11 @@ TEST_CASE("A session manager restores everything", "[nsm]") {
     play->write("load PolyTriangle\nset m_K 0.0625\ntuning \"" + folder.file("two.scl") + "\"\n");
     REQUIRE(play->says("m_K = 0.0625"));
     CHECK(manager.hears("/nsm/client/is_dirty", ""));
-    std::this_thread::sleep_for(1500ms);  // the connection is noticed
+    std::this_thread::sleep_for(1500ms);  // so that the connection is seen
     manager.save();
     REQUIRE(manager.hears("/reply", "/nsm/client/save"));
     CHECK(manager.hears("/nsm/client/is_clean", ""));
-    // Another project under another name does not contain the first one's things.
+    // Another project under another name has nothing of the first.
     manager.open(folder.file("second.nDEF"), "ressort.nDEF");
     REQUIRE(manager.hears("/reply", "/nsm/client/open"));
     CHECK_FALSE(has_port("ressort.nABC:out_left"));

@@ -296,7 +296,7 @@ TEST_CASE("The inputs of an ALSA device drive a model's audio inputs", "[alsa]")
   CHECK(heard_db <= 0.0);
   const double null_db = peak("null");
   CAPTURE(null_db);
-  CHECK((null_db < -100.0 || null_db == 0.0));  // silence is no number
+  CHECK((null_db < -100.0 || null_db == 0.0));  // 0: silence, printed as a word
   for (const char* const ending : {".raw", ".conf"}) {
     fs::remove(there + ending);
   }

@@ -39,33 +39,33 @@ const char* const meaning =
 
 }  // namespace
 
-std::vector<bool> front_of(std::span<const Trade> trades) {
+std::vector<bool> front_of(std::span<const CostAndAccuracy> points) {
   std::vector<std::size_t> order;
-  for (std::size_t i = 0; i < trades.size(); ++i) {
-    if (std::isfinite(trades[i].ns) && std::isfinite(trades[i].snr_db) && trades[i].ns > 0.0) {
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (std::isfinite(points[i].ns) && std::isfinite(points[i].snr_db) && points[i].ns > 0.0) {
       order.push_back(i);
     }
   }
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return trades[a].ns < trades[b].ns ||
-           (trades[a].ns == trades[b].ns && trades[a].snr_db > trades[b].snr_db);
+    return points[a].ns < points[b].ns ||
+           (points[a].ns == points[b].ns && points[a].snr_db > points[b].snr_db);
   });
-  std::vector<bool> is_on(trades.size(), false);
+  std::vector<bool> is_on(points.size(), false);
   double best = -HUGE_VAL;
   for (const std::size_t i : order) {
-    is_on[i] = trades[i].snr_db > best;
-    best = std::max(best, trades[i].snr_db);
+    is_on[i] = points[i].snr_db > best;
+    best = std::max(best, points[i].snr_db);
   }
   return is_on;
 }
 
 void find_fronts(ChartSheet& sheet) {
   for (const std::size_t reference : {published, physical}) {
-    std::vector<Trade> trades;
+    std::vector<CostAndAccuracy> points;
     for (const ChartRow& row : sheet.rows) {
-      trades.push_back({row.failure.empty() ? row.ns : HUGE_VAL, row.snr_db[reference]});
+      points.push_back({row.failure.empty() ? row.ns : HUGE_VAL, row.snr_db[reference]});
     }
-    const std::vector<bool> is_on = front_of(trades);
+    const std::vector<bool> is_on = front_of(points);
     for (std::size_t i = 0; i < is_on.size(); ++i) {
       sheet.rows[i].is_on_front[reference] = is_on[i];
     }

@@ -39,14 +39,14 @@ struct ChartSheet {
 };
 
 // Cost and accuracy of a method.
-struct Trade {
+struct CostAndAccuracy {
   double ns = 0.0;
   double snr_db = 0.0;
 };
 
-// Finds the Pareto front: [trade] whether no other trade is both cheaper and better. Of equal
-// trades the first is on the front. A trade that is not finite never is.
-std::vector<bool> front_of(std::span<const Trade> trades);
+// Finds the Pareto front: [point] whether no other point is both cheaper and better. Of equal
+// points the first is on the front. A point that is not finite never is.
+std::vector<bool> front_of(std::span<const CostAndAccuracy> points);
 
 // Sets `is_on_front` of the stable rows.
 void find_fronts(ChartSheet& sheet);

@@ -51,7 +51,8 @@ async function send() {
       });
       const text = new TextDecoder().decode(await answer.arrayBuffer());
       for (const error of text.matchAll(/\/error\0\0,ss\0([^\0]*)\0+([^\0]+)/g)) complain(error[2]);
-      if (!answer.ok) complain('the program refused it: ' + answer.status);
+      if (!answer.ok)
+        complain('the program refused the command: status ' + answer.status);
     } catch { complain('the program does not answer'); waiting.length = 0; }
   }
   isSending = false;
@@ -262,7 +263,8 @@ function showSliders() {
     row.append(make('label', address, { for: id }), output, track);
     rows.push(row);
   }
-  if (!rows.length) rows.push(make('p', 'This model has none.', { class: 'quiet' }));
+  if (!rows.length)
+    rows.push(make('p', 'This model has no parameters.', {class: 'quiet'}));
   $('sliders').replaceChildren(...rows);
 }
 function showValue(name, value) { sliders.get(name)?.(value); }
@@ -281,8 +283,10 @@ function showLimits() {
       info.lowest > 0 ? info.lowest / info.value : 0);
     if (part > share) { share = part; nearest = info.name; }
   }
-  $('limits').textContent = share < 0.05 ? 'All are far from any limit of stability.'
-    : `Nearest to its limit of stability: ${nearest}${users(nearest)}, at ${(100 * share).toFixed(0)} % of it.`;
+  $('limits').textContent = share < 0.05 ?
+      'All parameters are far from their limits of stability.' :
+      `Nearest to its limit of stability: ${nearest}${users(nearest)}, at ${
+          (100 * share).toFixed(0)} % of it.`;
 }
 
 // --- modes ---------------------------------------------------------------------------------------------
@@ -293,13 +297,17 @@ $('find-modes').addEventListener('click', async () => {
     const found = await json('/modes?count=24');
     const of = serial;
     $('find-modes').hidden = true;
-    $('modes-text').textContent = (found.linear ? '' : 'As it is near rest: what bows, plucks or touches is open. ') +
-      'Choose one to see its shape, again to see it play.';
+    $('modes-text').textContent = (found.linear ? '' : 'Without contacts, bows and plectra. ') +
+        'Choose one to see its shape, again to see it play.';
     $('modes').replaceChildren(...found.modes.map((mode, i) => {
       const button = make('button', hertz(mode.hz), { 'aria-pressed': 'false' });
       button.append(make('small', `${noteName(mode.hz)}, ${mode.t60_s === null ? 'never decays' : 'T60 ' + mode.t60_s.toPrecision(2) + ' s'}`));
       const by = mode.inputs.map(([number, db]) => `input ${number} ${db === null ? 'not at all' : db + ' dB'}`).slice(0, 3).join(', ');
-      if (by) button.append(make('small', by, { title: 'How much an input excites it, below the mode that it excites most' }));
+      if (by)
+        button.append(make('small', by, {
+          title:
+              'Level at which each input excites this mode, relative to the mode that it excites most'
+        }));
       button.setAttribute('aria-label', `Mode ${i + 1}, ${hertz(mode.hz)}; ${by}`);
       button.addEventListener('click', () => {
         const on = button.getAttribute('aria-pressed') === 'true';
@@ -312,7 +320,7 @@ $('find-modes').addEventListener('click', async () => {
       return item;
     }));
     if (!found.modes.length)
-      $('modes-text').textContent = 'Nothing swings.';
+      $('modes-text').textContent = 'This network has no modes.';
   } catch (error) {
     $('modes-text').textContent = error.message;
   }

@@ -171,7 +171,7 @@ class Reader {
     }
     const std::string label = "@" + std::string(name);
     std::sort(numbers.begin(), numbers.end());
-    int next = 1;  // the next number without a gap
+    int next = 1;  // first unused number
     for (const int number : numbers) {
       if (number > next) {
         const std::string first = label + std::to_string(next);

@@ -184,7 +184,7 @@ TEST_CASE("the timbre of hidden parameters is always found", "[ask]") {
     std::printf("seed %2d: %.4f JND off, %d starts, %zu trials, %.2f s of CPU\n", seed, off,
                 asked_for->starts, asked_for->trials, took_s);
   }
-  std::printf("%d of %d returned within a tenth of what is noticed, the worst %.4f off\n", found,
+  std::printf("%d of %d results within 0.1 JND of the target, the worst %.4f JND off\n", found,
               seeds, worst);
   CHECK(found == seeds);
 }

@@ -38,11 +38,12 @@ const Way direct{.name = "direct", .method = Method::direct};
 
 }  // namespace
 
-TEST_CASE("Trades that no other trade beats are on the Pareto front", "[chart]") {
+TEST_CASE("Only points that no other point beats are on the Pareto front", "[chart]") {
   const double nan = std::nan("");
-  const std::vector<Trade> trades = {{10.0, 40.0}, {100.0, 60.0}, {100.0, 50.0},  {50.0, 40.0},
-                                     {5.0, nan},   {10.0, 40.0},  {1000.0, 61.0}, {1.0, -3.0}};
-  CHECK(front_of(trades) == std::vector<bool>{true, true, false, false, false, false, true, true});
+  const std::vector<CostAndAccuracy> points = {{10.0, 40.0},   {100.0, 60.0}, {100.0, 50.0},
+                                               {50.0, 40.0},   {5.0, nan},    {10.0, 40.0},
+                                               {1000.0, 61.0}, {1.0, -3.0}};
+  CHECK(front_of(points) == std::vector<bool>{true, true, false, false, false, false, true, true});
 }
 
 TEST_CASE("Partials of the continuous string follow the closed form", "[chart]") {
