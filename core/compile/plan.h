@@ -27,7 +27,7 @@ struct Part {
   std::size_t masses = 0;  // moving masses
   std::size_t links = 0;
   std::string form;  // form_name() of the kernel's tables, before the part is divided into shards
-  // ns per sample of all voices, with everything touching all the time: a rough estimate that is
+  // ns per sample of all voices, with all contacts closed all the time: a rough estimate that is
   // the same on every machine, and the time measured on this machine, 0 if unknown.
   double estimated_ns = 0.0;
   double measured_ns = 0.0;

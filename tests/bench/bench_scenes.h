@@ -29,7 +29,7 @@ struct BenchScene {
   std::string tuned_by = "";  // the parameter that sets a voice's pitch in FAUST
   std::string family = "";    // its curve in the picture; empty: none
   std::size_t elements = 0;   // approximate number of masses and links
-  bool is_worst = false;      // everything touches all the time, the case that the planner assumes
+  bool is_worst = false;  // all contacts are closed all the time, the case that the planner assumes
 };
 
 // Returns all scenes in the order in which they are printed.

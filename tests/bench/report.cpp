@@ -102,10 +102,10 @@ void print_regrets(const std::vector<Row>& rows) {
     if (times > tolerated) {
       std::printf("  %-26s %-6s %s, not %s: %.2f times%s\n", engine.scene.c_str(),
                   precision_of(engine), fastest->method.c_str(), chosen->method.c_str(), times,
-                  engine.is_worst ? "" : "; not everything touches here");
+                  engine.is_worst ? "" : "; some contacts are open here");
     }
   }
-  std::printf("  worst loss with everything touching: %.2f times\n", worst);
+  std::printf("  worst loss with all contacts closed: %.2f times\n", worst);
 }
 
 bool write_csv(const std::filesystem::path& path, const std::string& isa,

@@ -42,7 +42,7 @@ constexpr PresetKey keys[] = {
     {"control", "unit", "`position` or `swing` (`position`)", "for a touch: unit of `range`. One swing is the displacement of a loud note, measured at load: -2 is off the string, 0 touches it at rest, 1 presses as deep as the string moves, for any masses and springs"},
     {"control", "curve", "`linear` or `exponential` (`linear`)", "`exponential`: equal steps are equal ratios"},
     {"control", "travel", "above 0", "for a pluck, which requires it: distance of the finger from the string, on either side"},
-    {"control", "level_db", "[low, high]", "level of the softest and the loudest, added to `gain`; exact for plucks, bows and blows, whose sound does not depend on its size. Without it `range` determines the level"},
+    {"control", "level_db", "[low, high]", "gain of the softest and the loudest, in dB, added to `gain`; it does not change the gesture. Without it `range` determines the level"},
     {"control", "length_ms", "[longest, shortest] (one sample)", "for an impulse or a swing: duration of the softest and the hardest blow at the model's own pitch, shorter on higher keys; shorter is brighter"},
     {"control", "round_robin", "[place, of how many]", "for notes: controls with [1, 2] and [2, 2] alternate from note to note, like two hammers or up and down strokes"},
     {"control", "keys", "[low, high] ([0, 127])", "for notes: range of keys"},

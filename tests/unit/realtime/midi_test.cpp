@@ -1,4 +1,4 @@
-// MIDI bytes to events: every message and every error in one.
+// Reads every MIDI message, and every malformed one.
 #include "app/realtime/midi.h"
 
 #include <algorithm>
