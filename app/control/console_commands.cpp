@@ -344,9 +344,10 @@ std::string describe_stability(const Instrument& instrument) {
   const std::string proved = instrument.verdict == Verdict::stable ? "proved" : "not proved";
   const double margin = instrument.stiffness_margin;
   return margin >= most_bounded ? "no limit"
-         : margin >= 1.0 ? proved + "; every stiffness can grow by a factor of " + fixed(margin, 2)
-                         : proved + " without contacts; with all contacts closed, up to " +
-                               fixed(std::max(0.0, margin), 2) + " of the stiffness";
+         : margin >= 1.0
+             ? proved + "; every stiffness may be multiplied by up to " + fixed(margin, 2)
+             : proved + " without contacts; with all contacts closed, up to " +
+                   fixed(std::max(0.0, margin), 2) + " of the stiffness";
 }
 
 // Returns a row such as "cc71" with its effect for every control and controller.

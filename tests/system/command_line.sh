@@ -64,7 +64,7 @@ expect 0 "stable" "$program" check rings.mdl
 expect 0 '"frequency_deviation_hz"' "$program" body blow.flac --json
 expect 0 "rings.mdl: 1 mode at 26" "$program" body blow.flac --modes 1 -o rings.mdl --force
 expect 2 "rings.mdl" "$program" body blow.flac -o rings.mdl
-expect 2 "'blow.flac' is read: it cannot be the output" "$program" body blow.flac -o blow.flac
+expect 2 "'blow.flac' is an input, so it cannot be the output" "$program" body blow.flac -o blow.flac
 expect 2 "ends in .svg" "$program" body blow.flac --picture rings.png
 expect 0 "rings.wav" "$program" render Marimba -s 0 -o rings.wav
 expect 2 "'rings.wav': " "$program" body rings.wav
@@ -510,9 +510,9 @@ done
 printf 'quit\n' > quit.script
 expect 0 "playing without OSC: port 19783 of 127.0.0.1 is taken, perhaps by another ressort; choose another with -u 19784" \
   "$program" play -a dummy -m none -i -u 19783 -e quit.script
-expect 0 "port 19784, open to this machine and 10.0.0.0/8" "$program" play -a dummy -m none -i \
+expect 0 "port 19784, accessible from this machine and 10.0.0.0/8" "$program" play -a dummy -m none -i \
   -u 19784 -B 0.0.0.0 --osc-allow 10.0.0.0/8 -e quit.script
-expect 2 "say who may send with --osc-allow" "$program" play -a dummy -m none -i -B 0.0.0.0
+expect 2 "name the allowed senders with --osc-allow" "$program" play -a dummy -m none -i -B 0.0.0.0
 expect 2 "--osc-allow 10.0.0.5 needs -B too" "$program" play -a dummy -i --osc-allow 10.0.0.5
 kill -TERM "$first"
 wait "$first"

@@ -200,7 +200,7 @@ TEST_CASE("Without a session manager the program plays", "[nsm]") {
   REQUIRE(play.says("playing without the session manager"));
   REQUIRE(play.says("on JACK"));
   Child wrong(program({"play", "PolyTriangle", "-a", "jack", "-i"}), {{"NSM_URL", "http://x"}});
-  CHECK(wrong.says("NSM_URL is no address"));
+  CHECK(wrong.says("NSM_URL is not the address"));
   CHECK(wrong.exit_code() == 2);
 }
 

@@ -143,7 +143,7 @@ TEST_CASE("Sounds that cannot be described give errors", "[description]") {
     return text.find(part) != std::string::npos;
   };
   CHECK(has(complaint(std::vector<double>(100), {}), "has 100 samples, less than a frame of 2048"));
-  CHECK(has(complaint(std::vector<double>(4000), {.at = 2000}), "at 2000 does not lie within"));
+  CHECK(has(complaint(std::vector<double>(4000), {.at = 2000}), "at 2000 is not within the sound"));
   std::vector<double> odd(4000);
   odd[3000] = std::numeric_limits<double>::quiet_NaN();
   CHECK(has(complaint(odd, {}), "sample 3000 is not a number"));

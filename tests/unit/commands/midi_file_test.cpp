@@ -119,20 +119,20 @@ TEST_CASE("Whole, divided and escaped SysEx messages are passed on", "[midi_file
 TEST_CASE("Errors of a MIDI file have the offset of the byte", "[midi_file]") {
   CHECK(contains(failure({}), "MThd"));
   CHECK(contains(failure({'R', 'I', 'F', 'F', 0, 0, 0, 0}), "byte 0"));
-  CHECK(contains(failure({'M', 'T', 'h', 'd', 0, 0}), "byte 6: it ends"));
+  CHECK(contains(failure({'M', 'T', 'h', 'd', 0, 0}), "byte 6: the file ends"));
   CHECK(contains(failure(header(2, 1, 96)), "type 2"));
   CHECK(contains(failure(header(0, 1, 0)), "byte 12"));
   CHECK(contains(failure(header(0, 1, 0xe000)), "SMPTE"));
   CHECK(contains(failure(header(0, 1, (256 - 25) << 8)), "SMPTE"));
-  CHECK(contains(failure(header(0, 1, 96)), "byte 14: it ends before track 1 of 1"));
+  CHECK(contains(failure(header(0, 1, 96)), "byte 14: the file ends before track 1 of 1"));
   const Bytes head = header(0, 1, 96);  // 14 bytes, the track's events begin at 22
   CHECK(contains(failure(head + Bytes{'M', 'T', 'r', 'k', 0, 0, 0, 9, 0}),
                  "the file ends within a chunk"));
-  CHECK(contains(failure(head + track({0, 60, 1})), "byte 23: a data byte"));
-  CHECK(contains(failure(head + track({0, 0x90, 60, 0x90})), "byte 25: a status"));
+  CHECK(contains(failure(head + track({0, 60, 1})), "byte 23: expected an event"));
+  CHECK(contains(failure(head + track({0, 0x90, 60, 0x90})), "byte 25: expected a data byte"));
   CHECK(contains(failure(head + track({0, 0x90, 60})),
                  "byte 25: the file ends within a channel message"));
-  CHECK(contains(failure(head + track({0, 0xf4})), "byte 23: a status that no file"));
+  CHECK(contains(failure(head + track({0, 0xf4})), "byte 23: this status byte"));
   CHECK(contains(failure(head + track({0x81, 0x82, 0x83, 0x84, 0})), "byte 22: the time"));
   CHECK(contains(failure(head + track({0, 0xff, 0x51, 2, 1, 1})), "byte 23: a tempo"));
   CHECK(contains(failure(head + track({0, 0xff, 0x51, 3, 0, 0, 0})), "byte 23: a tempo"));

@@ -107,11 +107,12 @@ TEST_CASE("only named network senders are accepted", "[osc_access]") {
   CHECK(refusal({.bind_address = "0.0.0.0", .allow = "10.0.0.0/8"}) == "");
   CHECK(contains(refusal({.allow = "10.0.0.0/8"}), "needs -B too"));
   CHECK(contains(refusal({.bind_address = "0.0.0.0", .allow = "everybody"}), "'everybody'"));
-  CHECK(contains(refusal({.bind_address = "0.0.0.0/0"}), "no address to bind OSC to"));
+  CHECK(
+      contains(refusal({.bind_address = "0.0.0.0/0"}), "is not an address that OSC can listen on"));
   Harness harness;
   CHECK(harness.server->access() == "accessible from this machine only");
   CHECK(harness.open({.bind_address = "0.0.0.0", .port = 0, .allow = "10.0.0.0/8,10.1.2.3"})
-            ->access() == "open to this machine and 10.0.0.0/8, 10.1.2.3");
+            ->access() == "accessible from this machine and 10.0.0.0/8, 10.1.2.3");
 }
 
 TEST_CASE("packets from other senders are counted and ignored", "[osc_access]") {
@@ -297,7 +298,7 @@ TEST_CASE("a description of a thousand parameters arrives complete and in order"
   const auto pause = harness.client.receive();
   REQUIRE(pause);
   CHECK(pause->address == "/error");
-  CHECK(contains(pause->text(1), "what is played is played"));
+  CHECK(contains(pause->text(1), "notes are still played"));
   CHECK(harness.process.from_osc.size() == 1);
 }
 

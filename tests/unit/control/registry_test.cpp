@@ -224,10 +224,11 @@ TEST_CASE("unplayable messages are reported with what was expected", "[registry]
   check_error("/in/4/position 0", "/in/4/position: the model has the inputs 1 to 3");
   check_error("/in/x/position 0", "/in/x/position: the model has the inputs 1 to 3");
   check_error("/in/1x/position 0",
-              "/in/1x/position: an input knows /position, /force, /pluck and /bow");
+              "/in/1x/position: an input accepts /position, /force, /pluck and /bow");
   check_error("/in/1/2/position 0",
-              "/in/1/2/position: an input knows /position, /force, /pluck and /bow");
-  check_error("/in/1/wiggle 0", "/in/1/wiggle: an input knows /position, /force, /pluck and /bow");
+              "/in/1/2/position: an input accepts /position, /force, /pluck and /bow");
+  check_error("/in/1/wiggle 0",
+              "/in/1/wiggle: an input accepts /position, /force, /pluck and /bow");
   check_error("/in/1/force 1",
               "/in/1/force: input 1 accepts a position, not a force: use /in/N/position");
   check_error("/in/3/position 1",

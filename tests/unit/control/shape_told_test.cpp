@@ -52,7 +52,7 @@ TEST_CASE("the console shapes the current sound, and undo reverts it", "[shape_t
   CHECK(has(told, "300.0 Hz"));
   CHECK(has(squeezed(told), " Hz 300.0 Hz 300.0 Hz 0.00 JND"));
   CHECK(has(squeezed(told), "2.00 s 2.00 s 0.00 JND"));
-  CHECK(has(told, "'undo' takes it back"));
+  CHECK(has(told, "'undo' reverts it"));
   // Within a hundredth of a just noticeable difference: 0.05 cents.
   CHECK(fixture.now("k") == Approx(stiffness_for(300.0, 2.0, 48000.0)).epsilon(1e-4));
   h.play();

@@ -1,5 +1,5 @@
-// The meaning of the third state argument: how the reader decides it, reports it and warns about
-// doubt.
+// The meaning of the third state argument: how the reader decides it, reports it and warns if it is
+// uncertain.
 #include <string>
 
 #include "core/model/language/mdl.h"
@@ -13,9 +13,9 @@ constexpr ThirdArgument delayed = ThirdArgument::delayed_position;
 constexpr ThirdArgument velocity = ThirdArgument::velocity_per_second;
 const std::string ends = "@a mass 1 0 0\n@b mass 1 0 0\n";
 
-std::string doubt(const ParsedNetwork& parsed) {
+std::string motion_warning(const ParsedNetwork& parsed) {
   for (const Diagnostic& diagnostic : parsed.diagnostics) {
-    if (diagnostic.message.find("doubt") != std::string::npos) {
+    if (diagnostic.message.find(" is read as ") != std::string::npos) {
       return std::to_string(diagnostic.line) + ": " + diagnostic.message;
     }
   }
@@ -82,7 +82,7 @@ TEST_CASE("the reader reports the meaning of a motion and the reason", "[motion]
     CHECK(parsed.network.third == c.third);
     CHECK(parsed.third == (c.motion.starts_with("both") ? std::nullopt : std::optional(c.third)));
     CHECK(parsed.motion == c.motion);
-    CHECK(doubt(parsed).empty());
+    CHECK(motion_warning(parsed).empty());
   }
 }
 
@@ -127,7 +127,7 @@ TEST_CASE("states that fit both meanings are read as rest, with a warning", "[mo
   for (const Mass& mass : parsed.network.masses) {
     CHECK(initial_velocity(parsed.network, mass) == 0.0);
   }
-  CHECK(doubt(parsed) ==
+  CHECK(motion_warning(parsed) ==
         "2: a motion of 0 is read as rest, although motions are the position one sample before, as "
         "line 1 rests with a motion equal to its position; add '~motion velocity' or '~motion "
         "delayed' to decide");
@@ -138,15 +138,16 @@ TEST_CASE("a mix of dialects causes a warning only if something moves", "[motion
   const ParsedNetwork moving = parse_network(both + "@c mass 1 2 1");
   REQUIRE(moving.ok());
   CHECK(moving.network.third == velocity);
-  CHECK(doubt(moving) ==
+  CHECK(motion_warning(moving) ==
         "5: its motion is read as a velocity in units per second, as line 4 has 'nlContact', which "
         "is MIMS4Max; but line 3 has 'massG', which is MIMS: add '~motion delayed' to read the "
         "motions as MIMS does, or '~motion velocity' to keep this reading");
-  CHECK(doubt(parse_network(both)).empty());
-  CHECK(doubt(parse_network(both + "@c mass 1 2 0")).empty());
-  CHECK(doubt(parse_network(both + "@c mass 1 2 1\n~motion velocity")).empty());
-  CHECK(doubt(parse_network(both + "@c mass 1 2 1", {.third = delayed})).empty());
-  CHECK(doubt(parse_network(both + "@s string 5 1 1 0 0 1")).starts_with("5: its motion is read"));
+  CHECK(motion_warning(parse_network(both)).empty());
+  CHECK(motion_warning(parse_network(both + "@c mass 1 2 0")).empty());
+  CHECK(motion_warning(parse_network(both + "@c mass 1 2 1\n~motion velocity")).empty());
+  CHECK(motion_warning(parse_network(both + "@c mass 1 2 1", {.third = delayed})).empty());
+  CHECK(motion_warning(parse_network(both + "@s string 5 1 1 0 0 1"))
+            .starts_with("5: its motion is read"));
 }
 
 TEST_CASE("unknown and contradictory meanings are errors", "[motion]") {

@@ -174,7 +174,7 @@ TEST_CASE("the mean covers a second, and the lasting load is the median of five 
   CHECK(load.lasting() == Approx((2e-3 + 13e-4) / (14 * 16.0 / rate)).epsilon(1e-12));
 }
 
-TEST_CASE("voices are limited to those there is time for", "[overload]") {
+TEST_CASE("the computing time limits the number of voices", "[overload]") {
   // 8 voices take 1.68; three take 0.63 and stay.
   const Played heavy = played(10 * second, 0.0, 0.21);
   CHECK(heavy.last == 3);

@@ -116,7 +116,7 @@ TEST_CASE("a model without a preset is saved as a preset", "[keeping]") {
 TEST_CASE("undo reverts a change, a sweep, a load, and itself", "[keeping]") {
   LoadedHarness fixture;
   Harness& h = fixture.harness;
-  CHECK(has(h.say("undo"), "nothing to take back"));
+  CHECK(has(h.say("undo"), "nothing to undo"));
   h.say("set m_K 0.15");
   h.say("set m_K 0.16");  // within a second: one change
   h.say("undo");
@@ -125,7 +125,7 @@ TEST_CASE("undo reverts a change, a sweep, a load, and itself", "[keeping]") {
   CHECK(*h.session.parameter("m_K") == 0.16);
   REQUIRE(has(h.say("load triangle"), "triangle: 3 masses"));
   h.play();
-  CHECK(has(h.say("undo"), "tri is back"));
+  CHECK(has(h.say("undo"), "tri is restored"));
   CHECK(h.session.current()->name == "tri");
   CHECK(*h.session.parameter("m_K") == 0.16);
 }

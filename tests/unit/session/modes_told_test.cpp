@@ -59,7 +59,7 @@ TEST_CASE("a mode is tuned, undone and saved", "[modes_told]") {
   CHECK(after.find("220.000") != std::string::npos);
   CHECK(after.find("2.000") != std::string::npos);
   CHECK(harness.session.parameter("k") == 0.1);
-  CHECK(harness.say("undo").find("mine is back") != std::string::npos);
+  CHECK(harness.say("undo").find("mine is restored") != std::string::npos);
   CHECK(harness.say("modes 3") == before);
   harness.say("tune 1 A3");
   CHECK(harness.say("save tuned_one").find("saved to") != std::string::npos);

@@ -78,7 +78,7 @@ TEST_CASE("the console describes a sound in words", "[timbre_watch]") {
   CHECK(has(harness.say("timbre"), "no model is loaded"));
   harness.say("load " + write_triangle(folder));
   harness.play();
-  CHECK(has(harness.say("timbre"), "nothing plays"));
+  CHECK(has(harness.say("timbre"), "the output is silent"));
   std::size_t played = 0;
   const auto hear = [&](int periods) {
     REQUIRE(comes([&] { return harness.process.is_listening.is_raised(); }));
