@@ -296,7 +296,8 @@ Result<Done> command::set(ConsoleContext& console, Words words) {
     const ParameterInfo& info = current->instrument.parameters[event.index];
     std::string line = info.name + " = " + print_number(event.value);
     if (event.value != wanted) {
-      line += ", the " + std::string(event.value < wanted ? "highest" : "lowest") + " stable value";
+      line += ", the " + std::string(event.value < wanted ? "highest" : "lowest") +
+              " value of its range";
     }
     const std::string limited = describe_limit(message, event, current->instrument);
     lines.push_back(limited.empty() ? std::move(line) : limited);

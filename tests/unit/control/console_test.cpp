@@ -86,7 +86,7 @@ TEST_CASE("unstable models load only with --force, and parameters stay in the st
             "wide.toml:3:5: warning: 'K' is kept below 4.73876; above it the model is not stable"));
   CHECK(harness.say("set K 2") == "K = 2\n");
   CHECK(harness.say("set K 6") == "K: 6 is beyond the stable range, set to 4.73876\n");
-  CHECK(harness.say("set K -1") == "K = 0, the lowest it may be\n");
+  CHECK(harness.say("set K -1") == "K = 0, the lowest value of its range\n");
   const std::string params = harness.say("params");
   INFO(params);
   CHECK(has(params, "0 .. 4.73876  stable below 4.73876"));
@@ -200,8 +200,8 @@ TEST_CASE("set limits a parameter to its range, get prints it", "[console]") {
   harness.play();
   CHECK(harness.process.from_console.size() == 0);
   CHECK(harness.say("get m_K") == "m_K = 0.05\n");
-  CHECK(harness.say("set m_K 5") == "m_K = 0.2, the highest it may be\n");
-  CHECK(harness.say("set m_K -1") == "m_K = 0.01, the lowest it may be\n");
+  CHECK(harness.say("set m_K 5") == "m_K = 0.2, the highest value of its range\n");
+  CHECK(harness.say("set m_K -1") == "m_K = 0.01, the lowest value of its range\n");
   const std::string params = harness.say("params");
   INFO(params);
   CHECK(has(params, "m_K  0.01   0.01 .. 0.2  stable below 1.55485\n"));
