@@ -188,8 +188,8 @@ Result<Command> parse_command(std::string_view line) {
   const Row& row = **found;
   words.erase(words.begin());
   std::vector<std::string> wanted = split_words(row.words);
-  const bool goes_on = !wanted.empty() && wanted.back() == "...";
-  if (goes_on) {
+  const bool is_repeated = !wanted.empty() && wanted.back() == "...";
+  if (is_repeated) {
     wanted.pop_back();
   }
   const auto needed = static_cast<std::size_t>(
@@ -200,7 +200,7 @@ Result<Command> parse_command(std::string_view line) {
   for (std::size_t i = needed; i < std::min(words.size(), wanted.size()); ++i) {
     is_other |= wanted[i].starts_with("[--") && wanted[i] != "[" + words[i] + "]";
   }
-  const bool are_more = !goes_on && words.size() > wanted.size();
+  const bool are_more = !is_repeated && words.size() > wanted.size();
   if (words.size() < needed || are_more || is_other) {
     return Error{
         "the command is '" + usage(row) + "', found " + counted(words.size(), "word", "words") +

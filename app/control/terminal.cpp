@@ -317,8 +317,8 @@ struct Terminal::Input {
     el_wset(editor, EL_ADDFN, L"ressort-complete", L"Completes a word", complete);
     el_set(editor, EL_BIND, "^I", "ressort-complete", nullptr);
     el_set(editor, EL_BIND, "^R", "em-inc-search-prev", nullptr);
-    bool goes_on = true;
-    while (goes_on) {
+    bool should_continue = true;
+    while (should_continue) {
       el_resize(editor);
       flush_messages();  // The prompt is printed after it.
       set_editing(true);
@@ -337,7 +337,7 @@ struct Terminal::Input {
       if (!words.empty()) {
         history(lines, &event, H_ENTER, words.c_str());
       }
-      goes_on = run_line(words);
+      should_continue = run_line(words);
     }
     if (!path.empty()) {
       history(lines, &event, H_SAVE, path.c_str());
@@ -367,14 +367,14 @@ struct Terminal::Input {
     const RawMode raw;
     char last = 0;
     Clock::time_point last_time;
-    bool goes_on = true;
-    while (goes_on) {
+    bool should_continue = true;
+    while (should_continue) {
       const Woken woken = wait(1000);
       if (woken == Woken::over) {
         return;
       }
       if (woken == Woken::nothing) {
-        goes_on = on_key(0);
+        should_continue = on_key(0);
         last = 0;
         continue;
       }
@@ -388,9 +388,9 @@ struct Terminal::Input {
         continue;
       }
       const Clock::time_point now = Clock::now();
-      for (ssize_t i = 0; i < got && goes_on; ++i) {
+      for (ssize_t i = 0; i < got && should_continue; ++i) {
         if (bytes[i] != last || now - last_time > repetition) {
-          goes_on = on_key(bytes[i]);
+          should_continue = on_key(bytes[i]);
         }
         last = bytes[i];
       }

@@ -23,7 +23,7 @@ constexpr std::size_t most_still = 4000;  // Limit on fixed nodes.
 constexpr std::size_t most_lines = 12'000;
 constexpr std::uint32_t nowhere = 0xffffffffu;
 
-// The kind of a law, as the page's colours know it.
+// Returns the group of laws that have the same colour on the page.
 const char* kind_of(const LawFacts& law) {
   return law.is_friction      ? "bow"
          : law.is_spring()    ? "spring"

@@ -331,7 +331,7 @@ class StabilityChecker {
   void report_range(std::size_t i) {
     ParameterInfo& info = result_.parameters[i];
     if (is_audio(i) && box_.lowest[i] == box_.highest[i]) {
-      return;  // Nothing is proved, and an audio input without a range would be useless.
+      return;  // An audio input without a range has no use here, and no range is proved.
     }
     if (const auto safe = request_.bare || result_.is_together
                               ? std::nullopt

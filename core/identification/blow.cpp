@@ -96,12 +96,12 @@ Clipped find_clipped(const Recording& recording, double peak) {
     std::size_t run = 0;
     for (std::size_t n = 0; n <= channel.size(); ++n) {
       const bool is_at_peak = n < channel.size() && std::fabs(channel[n]) >= peak * (1.0 - 1e-9);
-      const bool goes_on = is_at_peak && (run == 0 || channel[n] == channel[n - 1]);
-      if (!goes_on && run >= clipped_run) {
+      const bool is_same_run = is_at_peak && (run == 0 || channel[n] == channel[n - 1]);
+      if (!is_same_run && run >= clipped_run) {
         clipped.count += run;
         clipped.end = std::max(clipped.end, n);
       }
-      run = goes_on ? run + 1 : is_at_peak ? 1 : 0;
+      run = is_same_run ? run + 1 : is_at_peak ? 1 : 0;
     }
   }
   return clipped;

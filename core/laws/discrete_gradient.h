@@ -79,9 +79,9 @@ static inline V force_between(V far, V start, V free, V gamma, Force&& g) {
     const V newton = after - over / steep;
     const V next =
         select((newton >= low) & (newton <= high) & (steep > V{}), newton, (low + high) / 2);
-    const auto goes_on = absolute(next - after) > tiny * (absolute(after) + absolute(free));
+    const auto is_moving = absolute(next - after) > tiny * (absolute(after) + absolute(free));
     after = select(live, next, after);
-    live = live & goes_on;
+    live = live & is_moving;
   }
   const Slope<V> here = g(after);
   const V over = after - free + gamma * here.value;

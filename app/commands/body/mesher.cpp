@@ -63,7 +63,7 @@ std::string last_words(const std::string& log) {
 
 // Runs a program in the folder, with its output in the file "log" there.
 Result<Done> run(std::vector<std::string> words, const TemporaryFolder& folder, double limit_s,
-                 const std::function<bool()>& goes_on) {
+                 const std::function<bool()>& should_continue) {
   std::vector<char*> arguments;
   for (std::string& word : words) {
     arguments.push_back(word.data());
@@ -99,7 +99,7 @@ Result<Done> run(std::vector<std::string> words, const TemporaryFolder& folder, 
       return Error{"lost contact with " + words[0]};
     }
     const bool is_late = Clock::now() > end;
-    if (is_late || !goes_on()) {
+    if (is_late || !should_continue()) {
       kill(-child, SIGKILL);
       kill(child, SIGKILL);
       while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
@@ -136,7 +136,7 @@ using Fill = std::function<Result<TetrahedronMesh>(double edge)>;
 
 Result<TetrahedronMesh> by_gmsh(const ClosedSurface& closed, double edge,
                                 const TemporaryFolder& folder, const MeshOrder& order,
-                                const std::function<bool()>& goes_on) {
+                                const std::function<bool()>& should_continue) {
   Error first;
   for (const bool anew : {true, false}) {
     for (const auto& [name, text] : {std::pair("surface.stl", as_stl(closed)),
@@ -146,7 +146,7 @@ Result<TetrahedronMesh> by_gmsh(const ClosedSurface& closed, double edge,
       }
     }
     const auto ran = run({"gmsh", "-3", "body.geo", "-o", "body.msh", "-v", "2", "-nt", "1"},
-                         folder, order.limit_s, goes_on);
+                         folder, order.limit_s, should_continue);
     if (ran) {
       const auto text = read_bytes(folder.file("body.msh"), max_mesh_bytes);
       auto mesh = text ? read_gmsh(*text) : Result<TetrahedronMesh>(text.error());
@@ -166,14 +166,15 @@ Result<TetrahedronMesh> by_gmsh(const ClosedSurface& closed, double edge,
 
 Result<TetrahedronMesh> by_tetgen(const ClosedSurface& closed, double edge,
                                   const TemporaryFolder& folder, const MeshOrder& order,
-                                  const std::function<bool()>& goes_on) {
+                                  const std::function<bool()>& should_continue) {
   if (auto written = write_text(folder.file("body.smesh"), as_smesh(closed), Existing::replace);
       !written) {
     return written.error();
   }
   char switches[64];  // TetGen cannot read exponents here
   std::snprintf(switches, sizeof switches, "-pq1.4a%.24fQ", edge * edge * edge / 8.5);
-  if (auto ran = run({"tetgen", switches, "body.smesh"}, folder, order.limit_s, goes_on); !ran) {
+  if (auto ran = run({"tetgen", switches, "body.smesh"}, folder, order.limit_s, should_continue);
+      !ran) {
     return ran.error();
   }
   const auto nodes = read_bytes(folder.file("body.1.node"), max_mesh_bytes);
@@ -225,7 +226,7 @@ void restore_volume(TetrahedronMesh& mesh, const ClosedSurface& closed) {
 }  // namespace
 
 Result<Meshed> fill_with_tetrahedra(const ClosedSurface& closed, const MeshOrder& order,
-                                    const std::function<bool()>& goes_on) {
+                                    const std::function<bool()>& should_continue) {
   if (order.mesher == Mesher::automatic || order.mesher == Mesher::own) {
     if (const auto box = as_box(closed)) {
       return Meshed{oriented_box_mesh(*box, order.unknowns), "ressort, for boxes"};
@@ -258,8 +259,9 @@ Result<Meshed> fill_with_tetrahedra(const ClosedSurface& closed, const MeshOrder
       return folder.error();
     }
     auto mesh = fitted(edge, order.unknowns, [&](double size) {
-      return program.mesher == Mesher::gmsh ? by_gmsh(closed, size, *folder, order, goes_on)
-                                            : by_tetgen(closed, size, *folder, order, goes_on);
+      return program.mesher == Mesher::gmsh
+                 ? by_gmsh(closed, size, *folder, order, should_continue)
+                 : by_tetgen(closed, size, *folder, order, should_continue);
     });
     if (mesh) {
       restore_volume(*mesh, closed);

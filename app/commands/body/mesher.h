@@ -30,9 +30,9 @@ struct Meshed {
 };
 
 // Meshes the solid. Errors say what to install, or contain the last messages of the mesher.
-// `goes_on` is called a few times a second; if it returns false, the mesher is ended and the error
-// is `stopped`.
+// `should_continue` is called a few times a second; if it returns false, the mesher is ended and
+// the error is `stopped`.
 Result<Meshed> fill_with_tetrahedra(const ClosedSurface& closed, const MeshOrder& order,
-                                    const std::function<bool()>& goes_on);
+                                    const std::function<bool()>& should_continue);
 
 }  // namespace ressort::commands

@@ -297,13 +297,13 @@ int solid_body(const SolidBodyOptions& options) {
   watch_for_interrupt();
   ProgressBar bar(!options.is_quiet);
   double share = 0.0;
-  const auto goes_on = [&](std::string_view stage) {
+  const auto should_continue = [&](std::string_view stage) {
     bar.show(share, std::string(stage));
     return !called_off.is_raised();
   };
   const Progress progress([&](std::string_view stage) {
     share = stage == "finding its modes" ? 0.6 : stage == "reading the solid" ? 0.0 : 0.3;
-    return goes_on(stage);
+    return should_continue(stage);
   });
   // Reports an error or the interruption. No file has been written in that case.
   const auto failed = [&](const Error& error) {
@@ -325,7 +325,7 @@ int solid_body(const SolidBodyOptions& options) {
     }
     share = 0.1;
     const auto meshed =
-        fill_with_tetrahedra(*closed, options.mesh, [&] { return goes_on("meshing"); });
+        fill_with_tetrahedra(*closed, options.mesh, [&] { return should_continue("meshing"); });
     if (!meshed) {
       return failed(Error{meshed.error().message == stopped
                               ? stopped

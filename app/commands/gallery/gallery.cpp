@@ -88,7 +88,7 @@ using ShouldContinue = std::function<bool()>;
 // Renders notes to a file and reads the file.
 Result<Take> play_notes(const GalleryOptions& options, const std::string& preset,
                         const std::string& file, const std::vector<PhraseNote>& notes,
-                        double length_s, int voices, const ShouldContinue& goes_on) {
+                        double length_s, int voices, const ShouldContinue& should_continue) {
   const std::string path = (std::filesystem::path(options.folder) / file).string();
   auto rendered = render({.name = preset,
                           .output = path,
@@ -97,7 +97,7 @@ Result<Take> play_notes(const GalleryOptions& options, const std::string& preset
                           .phrase = to_score(notes),
                           .voices = voices,
                           .threads = 1},
-                         [&](double) { return goes_on(); });
+                         [&](double) { return should_continue(); });
   if (!rendered) {
     return rendered.error();
   }
@@ -137,7 +137,7 @@ std::vector<double> peaks_of(const Sound& sound, Stretch from_start, std::size_t
 }
 
 ShownPreset show(const GalleryOptions& options, const std::string& name,
-                 const ShouldContinue& goes_on) {
+                 const ShouldContinue& should_continue) {
   ShownPreset shown{.name = name};
   const auto scene = load_scene(name, {});
   if (!scene) {
@@ -149,11 +149,11 @@ ShownPreset show(const GalleryOptions& options, const std::string& name,
   const std::vector<PhraseNote> notes = phrase_of(where);
   const double length_s = notes.back().end_s + ring_out_s;
   const int key = note_key + where.shift;
-  const auto phrase = play_notes(options, name, name + ".wav", notes, length_s, 0, goes_on);
-  const auto note = phrase
-                        ? play_notes(options, name, name + "-note.wav",
-                                     {{0.0, held_s, key, note_velocity}}, note_length_s, 1, goes_on)
-                        : phrase;
+  const auto phrase = play_notes(options, name, name + ".wav", notes, length_s, 0, should_continue);
+  const auto note =
+      phrase ? play_notes(options, name, name + "-note.wav", {{0.0, held_s, key, note_velocity}},
+                          note_length_s, 1, should_continue)
+             : phrase;
   if (!note) {
     shown.failure = note.error().message;
     return shown;
@@ -189,7 +189,7 @@ std::string today() {
 // Plays all presets, one thread per core.
 std::vector<ShownPreset> show_all(const GalleryOptions& options,
                                   const std::vector<std::string>& names,
-                                  const ShouldContinue& goes_on) {
+                                  const ShouldContinue& should_continue) {
   std::vector<ShownPreset> shown(names.size());
   ProgressBar bar(!options.is_quiet);
   std::mutex mutex;  // guards the next two and the bar
@@ -200,13 +200,13 @@ std::vector<ShownPreset> show_all(const GalleryOptions& options,
       std::size_t mine = 0;
       {
         const std::lock_guard lock(mutex);
-        if (next == names.size() || !goes_on()) {
+        if (next == names.size() || !should_continue()) {
           return;
         }
         mine = next++;
         bar.show(static_cast<double>(done) / static_cast<double>(names.size()), names[mine]);
       }
-      ShownPreset made = show(options, names[mine], goes_on);
+      ShownPreset made = show(options, names[mine], should_continue);
       const std::lock_guard lock(mutex);
       ++done;
       shown[mine] = std::move(made);
@@ -225,7 +225,7 @@ std::vector<ShownPreset> show_all(const GalleryOptions& options,
 
 }  // namespace
 
-int gallery(const GalleryOptions& options, const ShouldContinue& goes_on) {
+int gallery(const GalleryOptions& options, const ShouldContinue& should_continue) {
   const std::vector<std::string> names = known_presets();
   if (names.empty()) {
     return reject("no presets found beside '" + models_folder() + "'");
@@ -238,8 +238,8 @@ int gallery(const GalleryOptions& options, const ShouldContinue& goes_on) {
   if (error) {
     return reject("cannot create the folder '" + options.folder + "': " + error.message());
   }
-  const std::vector<ShownPreset> shown = show_all(options, names, goes_on);
-  if (!goes_on()) {
+  const std::vector<ShownPreset> shown = show_all(options, names, should_continue);
+  if (!should_continue()) {
     print_error("interrupted; no page is written");
     return exit_code::our_failure;
   }

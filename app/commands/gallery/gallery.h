@@ -16,8 +16,8 @@ struct GalleryOptions {
 
 // Renders all known presets, one per core at a time, and writes NAME.wav, NAME-note.wav, index.html
 // and spectra.svg into the folder, replacing existing files. Reports a preset that fails and lists
-// it without a figure. `goes_on`, which any thread may call, returns false to stop. Returns the
-// exit code.
-int gallery(const GalleryOptions& options, const std::function<bool()>& goes_on);
+// it without a figure. `should_continue`, which any thread may call, returns false to stop. Returns
+// the exit code.
+int gallery(const GalleryOptions& options, const std::function<bool()>& should_continue);
 
 }  // namespace ressort::commands

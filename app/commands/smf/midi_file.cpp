@@ -87,10 +87,10 @@ class Track {
       : reader_(reader), events_(events), bytes_(bytes) {}
 
   void read() {
-    bool goes_on = true;
-    while (goes_on && !reader_.is_at_end() && !reader_.failure()) {
+    bool should_continue = true;
+    while (should_continue && !reader_.is_at_end() && !reader_.failure()) {
       tick_ += reader_.quantity("the time before an event");
-      goes_on = read_event();
+      should_continue = read_event();
     }
     add(TrackEvent::Kind::end, 0, 0);
   }

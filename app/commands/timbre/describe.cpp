@@ -47,8 +47,8 @@ Result<Description> describe_file(const std::string& path, const DescribeOptions
   if (!description || options.modes == 0) {
     return description;
   }
-  const Progress goes_on([&](std::string_view) { return progress(1.0); });
-  const auto found = identify_recording(path, {.most_modes = options.modes}, goes_on);
+  const Progress should_continue([&](std::string_view) { return progress(1.0); });
+  const auto found = identify_recording(path, {.most_modes = options.modes}, should_continue);
   if (!found) {
     const std::string why = renamed(found.error().message, path, options.name);
     std::fprintf(stderr, "%s: no modes\n", why.c_str());
@@ -171,7 +171,7 @@ Result<Description> description_of(const DescribeOptions& options,
                      "' is a sound file and has no parameters; --set needs a model"};
 }
 
-int describe(const DescribeOptions& options, const std::function<bool()>& goes_on) {
+int describe(const DescribeOptions& options, const std::function<bool()>& should_continue) {
   for (const std::string& output : options.outputs) {
     const bool is_table = !options.swept.empty() && output.ends_with(".csv");
     if (!output.ends_with(".svg") && !is_table) {
@@ -188,7 +188,7 @@ int describe(const DescribeOptions& options, const std::function<bool()>& goes_o
     }
   }
   if (!options.swept.empty()) {
-    return sweep(options, goes_on);
+    return sweep(options, should_continue);
   }
   Result<Description> description = Error{};
   {
@@ -197,11 +197,11 @@ int describe(const DescribeOptions& options, const std::function<bool()>& goes_o
         options,
         [&](double share) {
           bar.show(share, options.name);
-          return goes_on();
+          return should_continue();
         },
         [](const std::string& warning) { std::fprintf(stderr, "%s\n", warning.c_str()); });
   }
-  if (!goes_on()) {
+  if (!should_continue()) {
     std::fprintf(stderr, "%s: interrupted\n", options.name.c_str());
     return exit_code::our_failure;
   }

@@ -50,8 +50,8 @@ Result<Description> description_of(const DescribeOptions& options,
                                    const DescriptionProgress& progress,
                                    const std::function<void(const std::string&)>& warn);
 
-// Analyses a sound file, one rendered note of a preset, or the modes of a linear model. `goes_on`
-// returns false to stop. Returns the exit code. [main]
-int describe(const DescribeOptions& options, const std::function<bool()>& goes_on);
+// Analyses a sound file, one rendered note of a preset, or the modes of a linear model.
+// `should_continue` returns false to stop. Returns the exit code. [main]
+int describe(const DescribeOptions& options, const std::function<bool()>& should_continue);
 
 }  // namespace ressort::commands

@@ -198,7 +198,7 @@ Result<Description> describe_sound(const std::string& path, const DescriptionOpt
   if (options.at) {
     return describe_frame(path, *first, *options.at, options, std::move(description));
   }
-  const auto goes_on = [&](double pass, const MonoReader& reader) {
+  const auto should_continue = [&](double pass, const MonoReader& reader) {
     const auto all = static_cast<double>(std::max(1LL, reader.frames()));
     return progress(0.5 * (pass + static_cast<double>(reader.read_so_far()) / all));
   };
@@ -215,7 +215,7 @@ Result<Description> describe_sound(const std::string& path, const DescriptionOpt
     }
     loudest_stretch.add(*block);
     rough.add(*block);
-    if (!goes_on(0.0, *first)) {
+    if (!should_continue(0.0, *first)) {
       return Error{description_stopped};
     }
   }
@@ -259,7 +259,7 @@ Result<Description> describe_sound(const std::string& path, const DescriptionOpt
     }
     again.add(*block);
     frames.add(*block);
-    if (!goes_on(1.0, *second)) {
+    if (!should_continue(1.0, *second)) {
       return Error{description_stopped};
     }
   }

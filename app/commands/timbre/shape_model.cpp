@@ -38,9 +38,9 @@ struct SoundTargets {
 };
 
 // Returns the figures of the loudest frame. A model is described by the first frame after a strike.
-Result<SoundTargets> liked(const std::string& path, const Progress& progress,
-                           const std::function<bool()>& goes_on) {
-  const auto sound = describe_sound(path, {}, [&](double) { return goes_on(); });
+Result<SoundTargets> targets_like(const std::string& path, const Progress& progress,
+                                          const std::function<bool()>& should_continue) {
+  const auto sound = describe_sound(path, {}, [&](double) { return should_continue(); });
   if (!sound) {
     return sound.error();
   }
@@ -145,9 +145,9 @@ int key_near(double f0_hz, const Preset& preset) {
 
 }  // namespace
 
-int shape_model(const ShapeOptions& options, const std::function<bool()>& goes_on) {
+int shape_model(const ShapeOptions& options, const std::function<bool()>& should_continue) {
   const auto refuse = [&](const std::string& message) {
-    const bool was_stopped = !goes_on();
+    const bool was_stopped = !should_continue();
     std::fprintf(stderr, "%s\n",
                  was_stopped ? (options.name + ": interrupted").c_str() : message.c_str());
     return was_stopped ? exit_code::our_failure : exit_code::wrong_use;
@@ -161,7 +161,7 @@ int shape_model(const ShapeOptions& options, const std::function<bool()>& goes_o
   LoadProgress news(options.name, print_error);
   const Progress progress([&](std::string_view stage) {
     news.at(stage);
-    return goes_on();
+    return should_continue();
   });
   auto scene = load_scene(options.name, {.third = options.third, .progress = progress});
   if (!scene) {
@@ -182,7 +182,7 @@ int shape_model(const ShapeOptions& options, const std::function<bool()>& goes_o
   double rate_hz = options.rate_hz.value_or(Network::reference_rate_hz);
   SoundTargets like;
   if (!options.like.empty()) {
-    auto found = liked(options.like, progress, goes_on);
+    auto found = targets_like(options.like, progress, should_continue);
     if (!found) {
       return refuse(found.error().message);
     }
@@ -229,7 +229,7 @@ int shape_model(const ShapeOptions& options, const std::function<bool()>& goes_o
        .has_keys = has_keys,
        .key = options.key.value_or(like.f0_hz ? key_near(*like.f0_hz, scene->preset) : usual_key),
        .rate_hz = rate_hz,
-       .progress = Progress([&](std::string_view) { return goes_on(); }),
+       .progress = Progress([&](std::string_view) { return should_continue(); }),
        .on_progress =
            [&](double share) { bar->show(share, "searching the timbre of " + scene->name); }},
       targets);

@@ -24,7 +24,7 @@ struct ShapeOptions {
   std::optional<ThirdArgument> third;
 };
 
-// `goes_on` returns false to stop. Returns the exit code. [main]
-int shape_model(const ShapeOptions& options, const std::function<bool()>& goes_on);
+// `should_continue` returns false to stop. Returns the exit code. [main]
+int shape_model(const ShapeOptions& options, const std::function<bool()>& should_continue);
 
 }  // namespace ressort::commands

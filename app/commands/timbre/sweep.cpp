@@ -161,7 +161,7 @@ std::string to_csv(const SweepTable& table, const std::vector<SweptParameter>& s
   return text;
 }
 
-int sweep(const DescribeOptions& options, const std::function<bool()>& goes_on) {
+int sweep(const DescribeOptions& options, const std::function<bool()>& should_continue) {
   SweepTable table{.of = options.name, .names = figure_names()};
   const auto pictures = std::count_if(options.outputs.begin(), options.outputs.end(),
                                       [](const auto& path) { return path.ends_with(".svg"); });
@@ -199,10 +199,10 @@ int sweep(const DescribeOptions& options, const std::function<bool()>& goes_on) 
           one,
           [&](double share) {
             bar.show((done + share) / static_cast<double>(count), options.name + place);
-            return goes_on();
+            return should_continue();
           },
           warn_once);
-      if (!goes_on()) {
+      if (!should_continue()) {
         break;
       }
       if (!description && table.rows.empty()) {
@@ -216,7 +216,7 @@ int sweep(const DescribeOptions& options, const std::function<bool()>& goes_on) 
                                     : std::vector<std::optional<double>>(table.names.size())});
     }
   }
-  if (!goes_on()) {
+  if (!should_continue()) {
     std::fprintf(stderr, "%s: interrupted\n", options.name.c_str());
     return exit_code::our_failure;
   }

@@ -37,8 +37,8 @@ std::string to_csv(const SweepTable& table, const std::vector<SweptParameter>& s
 Result<plot::Figure> sweep_figure(const SweepTable& table, const DescribeOptions& options);
 
 // Analyses a sound for each combination of values. Prints equal warnings once. Sounds that cannot
-// be analysed have no figures; if the first fails, the sweep fails. `goes_on` returns false to stop
-// without writing. Returns the exit code. [main]
-int sweep(const DescribeOptions& options, const std::function<bool()>& goes_on);
+// be analysed have no figures; if the first fails, the sweep fails. `should_continue` returns false
+// to stop without writing. Returns the exit code. [main]
+int sweep(const DescribeOptions& options, const std::function<bool()>& should_continue);
 
 }  // namespace ressort::commands

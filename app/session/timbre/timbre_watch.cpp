@@ -103,8 +103,8 @@ void TimbreWatch::analyse_output() {
                      });
   process_.is_listening.raise();
   std::vector<double> samples;
-  bool goes_on = true;
-  while (goes_on) {
+  bool should_continue = true;
+  while (should_continue) {
     // A full ring has lost chunks, so the next chunk does not continue the last one.
     const bool is_whole = process_.listening.size() < process_.listening.capacity();
     samples.clear();
@@ -128,7 +128,7 @@ void TimbreWatch::analyse_output() {
     stream.add(samples);
     lock.lock();
     wake_.wait_for(lock, poll_time, [this] { return stop_; });
-    goes_on =
+    should_continue =
         is_whole && !stop_ && Clock::now() < until_ && process_.clock.read().rate_hz == rate_hz;
   }
   process_.is_listening.lower();

@@ -281,9 +281,9 @@ TEST_CASE("A missing mesher gives advice, and a hanging mesher is stopped", "[so
   const Workshop workshop;
   const std::string path = std::getenv("PATH");
   const auto with_path = [&](const std::string& folders, const MeshOrder& order,
-                             const std::function<bool()>& goes_on) {
+                             const std::function<bool()>& should_continue) {
     setenv("PATH", folders.c_str(), 1);
-    auto meshed = fill_with_tetrahedra(bent, order, goes_on);
+    auto meshed = fill_with_tetrahedra(bent, order, should_continue);
     setenv("PATH", path.c_str(), 1);
     return meshed;
   };

@@ -32,7 +32,7 @@ Scene scene_of(const std::string& text, const Preset& preset = {}) {
 }
 
 // Returns the error or the warning for a model without a preset; empty if it is admitted.
-std::string said_to(const std::string& text, const CompileOptions& options = {}) {
+std::string message_of(const std::string& text, const CompileOptions& options = {}) {
   std::vector<std::string> warnings;
   const auto admitted = compile_scene(scene_of(text), options, warnings);
   REQUIRE(warnings.size() <= 1);
@@ -54,36 +54,36 @@ ParameterBox box_of(const Instrument& instrument) {
 
 TEST_CASE("An unstable model is refused with the name and line of the culprit, or forced",
           "[stability_check]") {
-  CHECK(said_to(ground + "@r spring @g @m 3.9\n") == "");
+  CHECK(message_of(ground + "@r spring @g @m 3.9\n") == "");
   const std::string stiff = ground + "@r spring @g @m 5\n";
-  CHECK(said_to(stiff) ==
+  CHECK(message_of(stiff) ==
         "there.mdl:3:1: error: unstable: the stiffness 5 of 'r' must stay below 4; pass --force to "
         "play it anyway");
-  CHECK(said_to(stiff, {.force = true}) ==
+  CHECK(message_of(stiff, {.force = true}) ==
         "there.mdl:3:1: warning: unstable: the stiffness 5 of 'r' must stay below 4");
-  CHECK(
-      said_to(ground + "@r damper @g @m 2.5\n").find("the damping 2.5 of 'r' must stay below 2") !=
-      std::string::npos);
-  CHECK(said_to("@o osc 0.01 0.1 0. 0. 0.\n").find("there.mdl:1:1: error: unstable") == 0);
+  CHECK(message_of(ground + "@r damper @g @m 2.5\n")
+            .find("the damping 2.5 of 'r' must stay below 2") != std::string::npos);
+  CHECK(message_of("@o osc 0.01 0.1 0. 0. 0.\n").find("there.mdl:1:1: error: unstable") == 0);
   // A macro is one element, however many masses it has.
-  CHECK(said_to("@d string 50 1. 1.2 0. 0. 0.\n").find("'d' must stay below 1.00102") !=
+  CHECK(message_of("@d string 50 1. 1.2 0. 0. 0.\n").find("'d' must stay below 1.00102") !=
         std::string::npos);
   // The linear part of a cubic spring always acts.
-  CHECK(said_to(ground + "@r nlSpring3 @g @m 5 0.1 0.\n").find("'r' must stay below 4") !=
+  CHECK(message_of(ground + "@r nlSpring3 @g @m 5 0.1 0.\n").find("'r' must stay below 4") !=
         std::string::npos);
   // The stiffer of two parallel springs is named.
-  CHECK(said_to(ground + "@d damper @g @m 0.01\n@r spring @g @m 5\n").find("5 of 'r' must stay") !=
-        std::string::npos);
+  CHECK(
+      message_of(ground + "@d damper @g @m 0.01\n@r spring @g @m 5\n").find("5 of 'r' must stay") !=
+      std::string::npos);
   // At half the rate it is four times as stiff.
-  CHECK(said_to(ground + "@r spring @g @m 1.5\n", {.rate_hz = 22050.0})
+  CHECK(message_of(ground + "@r spring @g @m 1.5\n", {.rate_hz = 22050.0})
             .find("'r' must stay below 1, at 22050 Hz") != std::string::npos);
-  CHECK(said_to(ground + "@r spring @g @m 1.5\n", {.rate_hz = 22050.0, .rescale = false}) == "");
+  CHECK(message_of(ground + "@r spring @g @m 1.5\n", {.rate_hz = 22050.0, .rescale = false}) == "");
 }
 
 TEST_CASE("An argument that is not finite is refused with its element, line and parameters",
           "[stability_check]") {
   const auto said = [](const std::string& text, const std::vector<Setting>& settings = {}) {
-    return said_to(text, {.bare = true, .force = true, .settings = settings});
+    return message_of(text, {.bare = true, .force = true, .settings = settings});
   };
   CHECK(said("@P param 0\n" + ground + "@r spring @g @m 1/P\n") ==
         "there.mdl:4:1: error: the argument 1/P of 'r' is not finite when P = 0");
@@ -99,18 +99,18 @@ TEST_CASE("An argument that is not finite is refused with its element, line and 
   CHECK(said("@P param 0\n@s string 9 1 0.1 0 0 0\n@out1 posOutput [@s 1/P]\n") ==
         "there.mdl:3:17: error: the place 1/P is not finite when P = 0");
   // At a lower rate the stiffness grows. The values of an audio input are unknown.
-  CHECK(said_to(ground + "@r spring @g @m 1e308\n", {.rate_hz = 8000.0, .force = true}) ==
+  CHECK(message_of(ground + "@r spring @g @m 1e308\n", {.rate_hz = 8000.0, .force = true}) ==
         "there.mdl:3:1: error: the argument " + std::string("1e308") + " of 'r' is not finite");
   CHECK(compile_network(network_of("@K audioParam @in1\n@o osc 1 1/K 0 0 0\n"), {}, {}));
 }
 
 TEST_CASE("Numbers near the limits of double precision are reported correctly",
           "[stability_check]") {
-  CHECK(said_to(ground + "@r spring @g @m 0.1 1e308\n")
+  CHECK(message_of(ground + "@r spring @g @m 0.1 1e308\n")
             .find("the damping 1e308 of 'r' is too large for the analysis") != std::string::npos);
   for (const char* const stiffness : {"1e150", "1e262", "1e308"}) {
     INFO(stiffness);
-    CHECK(said_to(ground + "@r spring @g @m " + stiffness + " 0.1\n")
+    CHECK(message_of(ground + "@r spring @g @m " + stiffness + " 0.1\n")
               .find("of 'r' must stay below 3.8;") != std::string::npos);
   }
 }
@@ -121,17 +121,17 @@ TEST_CASE("Contacts that may never close, and unproved models, are not refused",
        {"contact @g @m 50 0.1 0.", "nlContact @g @m 0.1 0.1 50 0.1 0.", "nlPluck @g @m 500 0.1 0.",
         "nlBow @g @m 50 0.1", "nlBow @g @m 50 0.1 1", "nlSpringDamper @g @m 0.1 0.1 50 0.1"}) {
     INFO(link);
-    CHECK(said_to(ground + "@s spring @g @m 0.1 0.1\n@l " + link + "\n").find("stable") ==
+    CHECK(message_of(ground + "@s spring @g @m 0.1 0.1\n@l " + link + "\n").find("stable") ==
           std::string::npos);
   }
-  CHECK(said_to(ground + "@r spring @g @m -0.1\n") ==
+  CHECK(message_of(ground + "@r spring @g @m -0.1\n") ==
         "there.mdl:3:1: warning: may be unstable: the stiffness -0.1 of 'r' is negative, so motion "
         "can grow without end");
   // Too large to factorise and above the edge bound; a smaller stiffness is proved.
   const std::string mesh = "@d mesh 201 200 1. ";
-  CHECK(said_to(mesh + "0.51 0. 0. 0.\n", {.method = Method::direct}).find(" warning: ") !=
+  CHECK(message_of(mesh + "0.51 0. 0. 0.\n", {.method = Method::direct}).find(" warning: ") !=
         std::string::npos);
-  CHECK(said_to(mesh + "0.49 0. 0. 0.\n", {.method = Method::direct}) == "");
+  CHECK(message_of(mesh + "0.49 0. 0. 0.\n", {.method = Method::direct}) == "");
 }
 
 TEST_CASE("Passive links are not part of the proof", "[stability_check]") {
@@ -140,24 +140,23 @@ TEST_CASE("Passive links are not part of the proof", "[stability_check]") {
       "@g ground 0.\n@m mass 0.1 0. 0.\n@x nlSpringDamper @m @g 0.001 1e5 1e4 ";
   const CompileOptions as_played{.bare = true, .budget = Budget{}};
   const CompileOptions published{.bare = true};
-  CHECK(said_to(strong + "0.5\n") == "");
-  CHECK(said_to(strong + "0.5\n", as_played) == "");
-  CHECK(
-      said_to(strong + "0.5\n", published).find("the damping 0.5 of 'x' must stay below 0.1995") !=
-      std::string::npos);
+  CHECK(message_of(strong + "0.5\n") == "");
+  CHECK(message_of(strong + "0.5\n", as_played) == "");
+  CHECK(message_of(strong + "0.5\n", published)
+            .find("the damping 0.5 of 'x' must stay below 0.1995") != std::string::npos);
   // A negative stiffness or damping cannot be made passive, except in the middle of a spring.
   const auto is_told = [&](const std::string& link, const std::string& what) {
     const std::string may = "warning: may be unstable: the " + what + " of 'x' is negative";
     CAPTURE(link);
-    CHECK(said_to(ground + "@x " + link + "\n").find(may) != std::string::npos);
-    CHECK(said_to(ground + "@x " + link + "\n", as_played).find(may) != std::string::npos);
+    CHECK(message_of(ground + "@x " + link + "\n").find(may) != std::string::npos);
+    CHECK(message_of(ground + "@x " + link + "\n", as_played).find(may) != std::string::npos);
   };
   is_told("contact @m @g -0.1 0.01 0.", "stiffness -0.1");
   is_told("contact @m @g 0.1 -0.01 0.", "damping -0.01");
   is_told("nlBow @m @g -0.1 0.1", "damping -0.1");
   is_told("nlSpringDamper @m @g 0.1 0.1 -0.2 0.01", "stiffness -0.2");
   is_told("nlSpringDamper @m @g -0.1 0. 0.2 0.01", "stiffness -0.1");
-  CHECK(said_to(ground + "@x nlSpringDamper @m @g -0.1 0.1 0.2 0.01\n") == "");
+  CHECK(message_of(ground + "@x nlSpringDamper @m @g -0.1 0.1 0.2 0.01\n") == "");
   // `check` prints the limits of the network that the proof covers.
   const auto made = compile_network(network_of(strong + "0.5\n"), {}, {});
   REQUIRE(made);
@@ -230,8 +229,8 @@ TEST_CASE("Random nonlinear scenes get the same verdict everywhere and are refus
     const Verdict verdict = Stability(played->stability.proved, 1.0).certify(none).verdict;
     CHECK(played->stability.verdict == verdict);
     CHECK((verdict == Verdict::stable) == (spectral_radius(transition(program_of(linear))) < 1.0));
-    const std::string said = said_to(text);
-    CHECK(said == said_to(text, as_played));
+    const std::string said = message_of(text);
+    CHECK(said == message_of(text, as_played));
     CHECK(said.empty() == (verdict == Verdict::stable));
     refused += verdict == Verdict::stable ? 0 : 1;
   }
@@ -243,27 +242,28 @@ TEST_CASE("A bow that is too strong for its time steps is reported at its line, 
           "[stability_check]") {
   const std::string bowed = "@in1 posInput 0.\n@m osc 2. 0.01 0. 0. 0.\n@b nlBow @in1 @m ";
   const std::string heard = " 0.01\n@out1 posOutput @m\n";
-  CHECK(said_to(bowed + "5.9" + heard) == "");
-  const std::string told = said_to(bowed + "20" + heard);
+  CHECK(message_of(bowed + "5.9" + heard) == "");
+  const std::string told = message_of(bowed + "20" + heard);
   CHECK(told ==
         "there.mdl:3:1: warning: the bow 'b' is too strong: its Z of 20 per time step exceeds the "
         "limit of 6, three times the mass that it moves. It slips too early, and a single mass "
         "squeaks far above its pitch; lower Z, or use --method oversampled or a rate of 147000 Hz");
-  CHECK(said_to(bowed + "20" + heard, {.method = Method::oversampled}) == "");
-  CHECK(said_to(bowed + "20" + heard, {.rate_hz = 148000.0}) == "");
-  CHECK(said_to(bowed + "100" + heard).find("; lower Z, or use a rate of 735000 Hz") !=
+  CHECK(message_of(bowed + "20" + heard, {.method = Method::oversampled}) == "");
+  CHECK(message_of(bowed + "20" + heard, {.rate_hz = 148000.0}) == "");
+  CHECK(message_of(bowed + "100" + heard).find("; lower Z, or use a rate of 735000 Hz") !=
         std::string::npos);
   std::vector<std::string> warnings;
   const auto strict = compile_scene(scene_of(bowed + "20" + heard), {}, warnings, true);
   REQUIRE(!strict);
   CHECK(strict.error().message.find("there.mdl:3:1: error: the bow 'b'") == 0);
   // Published bows have no such limit. A place halfway between two masses has twice their mass.
-  CHECK(said_to(bowed + "20" + heard, {.bare = true, .budget = Budget{.passive = Passivity::never}})
+  CHECK(message_of(bowed + "20" + heard,
+                   {.bare = true, .budget = Budget{.passive = Passivity::never}})
             .find("is too strong") == std::string::npos);
   const std::string string =
       "@s string 9 2. 0.5 0. 0. 0.\n@in1 posInput 0.\n@out1 posOutput [@s 0.5]\n";
-  CHECK(said_to(string + "@b nlBow @in1 [@s 0.4375] 11.9 0.01\n") == "");
-  CHECK(said_to(string + "@b nlBow @in1 [@s 0.4375] 12.1 0.01\n").find("limit of 12, ") !=
+  CHECK(message_of(string + "@b nlBow @in1 [@s 0.4375] 11.9 0.01\n") == "");
+  CHECK(message_of(string + "@b nlBow @in1 [@s 0.4375] 12.1 0.01\n").find("limit of 12, ") !=
         std::string::npos);
   // Keys scale the strength of a bow with the root of the stiffness.
   const auto keyed =

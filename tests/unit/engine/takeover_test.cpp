@@ -55,9 +55,9 @@ double difference(const std::string& text, const Preset& preset, int stiffness, 
     player->run(2000, events, {64, 100, 17});  // in the middle of the stiffness ramp
   }
   const support::HeapWatch watch;
-  const bool goes_on = comes.engine().continue_from(leaves.engine());
+  const bool continues = comes.engine().continue_from(leaves.engine());
   const std::size_t heap_calls = watch.calls();
-  REQUIRE(goes_on);
+  REQUIRE(continues);
   CHECK(heap_calls == 0);
   stays.run(4000, ending);
   comes.run(4000, ending);

@@ -91,7 +91,7 @@ TEST_CASE("the laws match values computed by hand", "[direct]") {
         .1 * .3 + .05 * -.2);
 }
 
-TEST_CASE("a bow grips hardest at a third of its speed, a smooth one at s/sqrt 8", "[direct]") {
+TEST_CASE("a bow's friction is strongest at s/3, a smooth bow's at s/sqrt 8", "[direct]") {
   const double z = 0.1;
   const double s = 0.05;
   const double peak = bow(s / 3, z, s);

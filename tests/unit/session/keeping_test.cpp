@@ -11,7 +11,7 @@ namespace ressort::keeping_test {
 namespace {
 
 // Waits until the condition holds, at most two seconds.
-bool comes_true(Harness& harness, const std::function<bool()>& is_so) {
+bool becomes_true(Harness& harness, const std::function<bool()>& is_so) {
   for (int i = 0; i < 200 && !is_so(); ++i) {
     harness.play();
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
@@ -48,12 +48,12 @@ TEST_CASE("a parameter learns the next knob that moves, and forgets it", "[keepi
   turn(h, 20, 0.9);  // before anyone has requested it
   CHECK(has(h.say("learn M_k"), "m_K"));
   turn(h, 21, 0.25);
-  REQUIRE(comes_true(h, [&] { return h.session.learned().size() == 1; }));
+  REQUIRE(becomes_true(h, [&] { return h.session.learned().size() == 1; }));
   CHECK(h.session.learned()[0].controller == 21);
   // From 0.01 to 0.2 in equal ratios: half way is the root of 0.01 * 0.2.
   turn(h, 21, 0.5);
   const double middle = std::sqrt(0.01 * 0.2);
-  CHECK(comes_true(
+  CHECK(becomes_true(
       h, [&] { return std::fabs(h.session.parameter("m_K").value_or(0.0) - middle) < 1e-15; }));
   CHECK(has(h.say("explain"), "cc21"));
   CHECK(has(h.say("unlearn m_K"), "1 controller"));
@@ -75,7 +75,7 @@ TEST_CASE(
   Harness& h = fixture.harness;
   h.say("learn m_K");
   turn(h, 33, 0.5);
-  REQUIRE(comes_true(h, [&] { return h.session.learned().size() == 1; }));
+  REQUIRE(becomes_true(h, [&] { return h.session.learned().size() == 1; }));
   h.say("set m_K 0.125");
   CHECK(has(h.say("save \"my own\""), "saved to"));
   CHECK(has(h.say("save \"my own\""), "--force"));
@@ -93,7 +93,7 @@ TEST_CASE(
   CHECK(*h.session.parameter("m_K") == 0.125);
   CHECK(h.session.learned().empty());  // now it belongs to the preset
   turn(h, 33, 1.0);
-  CHECK(comes_true(h, [&] { return h.session.parameter("m_K") == 0.2; }));
+  CHECK(becomes_true(h, [&] { return h.session.parameter("m_K") == 0.2; }));
   // OSC may load the user's presets too.
   CHECK(find_scene("my own", Reach::own_folders));
 }
