@@ -45,7 +45,7 @@ struct Picture {
     std::vector<double> start_q;  // [mode]
     std::vector<float> shapes;    // [mode][dot]
 
-    // Count of the numbers from Engine::read_positions().
+    // Returns how many values Engine::read_positions() writes.
     std::size_t numbers() const {
       return (is_modal ? modes : count) + waveguides.size() * Engine::waveguide_points;
     }

@@ -114,7 +114,7 @@ class StruckModel {
 
  private:
   struct Tuned {
-    std::vector<HeardMode> modes;  // Residues by strike.
+    std::vector<HeardMode> modes;  // A residue for each strike.
     double factor = 1.0;
   };
   using Place = std::optional<std::span<const double>>;  // The place near which modes are wanted.
