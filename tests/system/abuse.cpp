@@ -2,8 +2,8 @@
 // over its whole range and beyond at audio rate, once within the stable range and once forced;
 // strikes, forces and positions of any size; random keys, bends and controllers; audio inputs with
 // noise, NaN and infinity. Every output sample must be finite and below the limiter's ceiling,
-// memory must not grow, and all notes must end once inputs, pedals and levers are released. The seed
-// of the random numbers is printed, to reproduce a failure.
+// memory must not grow, and all notes must end once inputs, pedals and levers are released. The
+// seed of the random numbers is printed, to reproduce a failure.
 #include <array>
 #include <cmath>
 #include <cstdio>

@@ -39,7 +39,7 @@ struct SoundTargets {
 
 // Returns the figures of the loudest frame. A model is described by the first frame after a strike.
 Result<SoundTargets> targets_like(const std::string& path, const Progress& progress,
-                                          const std::function<bool()>& should_continue) {
+                                  const std::function<bool()>& should_continue) {
   const auto sound = describe_sound(path, {}, [&](double) { return should_continue(); });
   if (!sound) {
     return sound.error();

@@ -38,7 +38,8 @@ void fill_future(Harness& harness) {
   }
 }
 
-// The position input is at 1 while a key is held; the note sounds at full level from the second block on.
+// The position input is at 1 while a key is held; the note sounds at full level from the second
+// block on.
 struct Held : Harness {
   Held() {
     process.slot.offer(sounding(hand_text, holding(), 1));
