@@ -85,7 +85,7 @@ TEST_CASE("The program survives the end of its server, or reports it by the exit
     Child play(program({"play", "PolyTriangle", "-a", "jack", "-i", "-u", osc_port}));
     REQUIRE(answers());
     server->kill();
-    REQUIRE(play.says("is gone"));
+    REQUIRE(play.says("is lost"));
     server.reset();
     server = std::make_unique<Server>(512);
     REQUIRE(play.says("playing again"));
@@ -145,7 +145,7 @@ TEST_CASE("The program survives the end of its server, or reports it by the exit
       CAPTURE(next.period_frames, next.is_killed);
       play.forget();
       next.is_killed ? server->kill() : server->end();
-      REQUIRE(play.says("is gone"));
+      REQUIRE(play.says("is lost"));
       CHECK(eventually([&] { return status_shows(play, "audio   none; waiting for JACK"); }));
       CHECK(play.said().find("cpu     no audio is running") != std::string::npos);
       neighbour.reset();
@@ -200,7 +200,7 @@ TEST_CASE("An overloaded program survives every end of its server", "[server_los
     std::this_thread::sleep_for(1s);
     play.forget();
     i % 2 == 0 ? server->end() : server->kill();
-    CHECK(play.says("is gone"));
+    CHECK(play.says("is lost"));
     server.reset();
     server = std::make_unique<Server>(128);
     CHECK(play.says("playing again"));
