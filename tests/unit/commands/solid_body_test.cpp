@@ -290,7 +290,7 @@ TEST_CASE("A missing mesher gives advice, and a hanging mesher is stopped", "[so
   const auto yes = [] { return true; };
   const auto without = with_path(workshop.file(""), {}, yes);
   REQUIRE_FALSE(without);
-  CHECK(without.error().message.find("gmsh") != std::string::npos);
+  CHECK(without.error().message.find("install the package gmsh") != std::string::npos);
 
   const std::string program = workshop.put("tetgen", "#!/bin/sh\nexec sleep 60\n");
   fs::permissions(program, fs::perms::owner_all);
