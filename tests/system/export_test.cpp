@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -286,15 +287,23 @@ with {
 )";
   const fs::path folder = fs::temp_directory_path() / ("ressort-felt-" + std::to_string(getpid()));
   fs::create_directory(folder);
-  const std::string felt_line = "powerContact ";
-  for (const auto& [name, model] :
-       {std::pair("mass", scenes::law(felt_line + "@m @in2 0.03 1.5 0.02 0.05")),
-        std::pair("waveguide",
-                  scenes::on_a_waveguide(felt_line + "[@s 0.4] @in2 0.03 1.5 0.02 0.05"))}) {
-    const auto text = model::faust_text(support::network_of(model), {.name = name, .laws = table});
+  const std::string numbers = " @in2 0.03 1.5 0.02 ";
+  const auto mass = scenes::law("powerContact @m" + numbers + "0.05");
+  const auto touching = scenes::on_a_waveguide("powerContact [@s 0.4]" + numbers + "0.05");
+  const auto apart = scenes::on_a_waveguide("powerContact [@s 0.4]" + numbers + "-0.05");
+  for (const auto& [name, model, call] :
+       {std::tuple("mass", mass, "felt(0.03*r*r, 1.5, 0.02*r, 0.05"),
+        std::tuple("touching", touching, " : start_felt;"),
+        std::tuple("apart", apart, " : alone_felt;")}) {
+    const model::Network network = support::network_of(model);
+    std::vector<model::ParameterSetting> sliders;
+    for (const model::Parameter& parameter : network.parameters) {
+      sliders.push_back({parameter.name, parameter.value, 0.0, 1.0, parameter.location});
+    }
+    const auto text = model::faust_text(network, {.name = name, .sliders = sliders, .laws = table});
     REQUIRE(text);
-    CHECK((text->find("felt(0.03*r*r, 1.5, 0.02*r, 0.05") != std::string::npos ||
-           text->find(" : alone_felt") != std::string::npos));
+    INFO(*text);
+    CHECK(text->find(call) != std::string::npos);
     CHECK(text->find("power_contact") == std::string::npos);
     const std::string path = (folder / name).string();
     write(path + ".dsp", *text);

@@ -4,6 +4,7 @@
 #include "core/model/faust/faust.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -1246,6 +1247,7 @@ Result<std::string> faust_text(const Network& network, const FaustOptions& optio
   if (auto refusal = faust_refusal(expanded, options.laws)) {
     return *refusal;
   }
+  assert(options.sliders.size() >= expanded.parameters.size());
   return Writer(network, std::move(expanded), options).text();
 }
 

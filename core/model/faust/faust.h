@@ -12,7 +12,7 @@ namespace ressort::model {
 
 struct FaustOptions {
   std::string name;                           // name of the model
-  std::span<const ParameterSetting> sliders;  // [parameter]
+  std::span<const ParameterSetting> sliders;  // [parameter], one for each
   bool rescale = true;  // coefficients follow the sample rate, as in the engine
   std::span<const LawFacts> laws = law_table();  // facts by Law; tests export a law of their own
 };
