@@ -186,7 +186,7 @@ Picture make_picture(Engine& engine, const Network& network, std::uint32_t numbe
       picture.start.push_back(program.position[node]);
     }
     const auto* const modes = program.form.get_if<Modes>();
-    if (modes != nullptr && modes->modes <= room) {
+    if (modes != nullptr && modes->modes <= room && !modes->is_crossed) {
       take_shapes(program, *modes, chosen.nodes, group);
     }
     group.waveguides = take_waveguides(program, network, chosen.nodes, group.first);

@@ -27,6 +27,7 @@ struct Workload {
   double highest_factor = 1.0;
   double wanted_factor = 1.0;  // the factor that keys require
   double moving = 0.25;        // fraction of the samples in which any parameter moves
+  bool is_untuned = false;     // true if every voice keeps the factor 1
   // executor among which large parts may be divided; null: one core for all
   Executor* executor = nullptr;
   bool reaches_beyond() const { return wanted_factor > highest_factor; }

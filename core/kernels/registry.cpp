@@ -72,7 +72,8 @@ constexpr KernelRow rows[] = {
     row<Modes, ModalKernel>(
         Method::modal, "modal", Use::published,
         [](const Request& r) {
-          return modal_form(r.program, r.budget, r.progress, r.load.reaches_beyond());
+          return modal_form(r.program, r.budget, r.progress, r.load.is_untuned,
+                            r.load.reaches_beyond());
         },
         least_modal_operations),
     row<Oversampled, OversampledKernel>(

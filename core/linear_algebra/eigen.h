@@ -58,4 +58,7 @@ Matrix in_basis(const Matrix& matrix, const Matrix& basis);
 // exceeds 1e-9 of b.
 std::optional<Vector> solution(const Matrix& matrix, const Vector& b);
 
+// Solves X A = B; empty if A is singular.
+std::optional<Matrix> quotient(const Matrix& b, const Matrix& a);
+
 }  // namespace ressort::linear_algebra

@@ -95,4 +95,11 @@ std::optional<Vector> solution(const Matrix& matrix, const Vector& b) {
   return Vector(x.data(), b.size());
 }
 
+std::optional<Matrix> quotient(const Matrix& b, const Matrix& a) {
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factor(map_of(a).transpose());
+  return factor.isInvertible()
+             ? std::optional(matrix_of(factor.solve(map_of(b).transpose()).transpose()))
+             : std::nullopt;
+}
+
 }  // namespace ressort::linear_algebra

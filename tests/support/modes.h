@@ -10,11 +10,12 @@
 namespace ressort::support {
 
 inline Program in_modes(const std::string& text, Passivity passive = Passivity::never,
-                        const Budget& budget = {}) {
+                        const Budget& budget = {}, bool is_crossed = false) {
   Program program = program_of(text, passive);
-  std::optional<Modes> modes = modal_form(program, budget);
+  std::optional<Modes> modes = modal_form(program, budget, {}, is_crossed);
   INFO(text);
   REQUIRE(modes);
+  REQUIRE(modes->is_crossed == is_crossed);
   program.form = std::move(*modes);
   return program;
 }

@@ -1,7 +1,9 @@
 #include "core/kernels/modal/modal.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <complex>
 
 namespace ressort::kernels {
 namespace {
@@ -70,6 +72,7 @@ class StateLayout {
         lanes_(vector_bytes(isa) / sizeof(T)),
         padded_(round_up(std::max(modes.modes, 1u), 2 * lanes_)),
         stride_(round_up(padded_, widest_bytes / sizeof(T))),
+        row_(modes.is_crossed ? 2 * stride_ : stride_),
         arena_(memory) {}
 
   std::size_t furnish(ModalState<T>& state) {
@@ -78,12 +81,13 @@ class StateLayout {
     const std::size_t observed = places + modes_.outputs.size();
     state.shapes.modes = padded_;
     state.shapes.stride = stride_;
+    state.shapes.row = row_;
     for (T** row : {&state.motion.q, &state.motion.d, &state.motion.k, &state.motion.z,
                     &state.saved.q, &state.saved.d, &state.sleep.spread, &state.sleep.decay,
                     &state.sleep.amplitude, &state.sleep.debt}) {
       *row = arena_.take(stride_);
     }
-    state.sweep.load = arena_.take(stride_);
+    state.sweep.load = arena_.take(row_);
     state.held.give = arena_.take(link_count(modes_));
     state.sleep.loudness = arena_.take(observed);
     state.sleep.room = arena_.take(observed);
@@ -95,7 +99,7 @@ class StateLayout {
         modes_.places, [](auto& place) -> auto& { return place.shape; });
     state.shapes.outputs = rows(
         modes_.outputs, [](auto& output) -> auto& { return output.place.shape; });
-    if (modes_.is_exact) {
+    if (modes_.is_exact && !modes_.is_crossed) {
       for (T** row : {&state.motion.root, &state.motion.k_step, &state.motion.z_step}) {
         *row = arena_.take(stride_);
       }
@@ -105,6 +109,12 @@ class StateLayout {
         std::copy_n(state.shapes.pushes, count, shape);
       }
       state.shapes.unscaled = shape;
+    }
+    if (modes_.is_crossed) {
+      state.shapes.speeds = rows(
+          modes_.places, [](auto& place) -> auto& { return place.speed; });
+      state.shapes.pole = rows(
+          std::array{&modes_.pole}, [](auto& pole) -> auto& { return *pole; });
     }
     state.shapes.push_norm = norms(
         modes_.pushes, [](auto& push) -> auto& { return push.shape; });
@@ -122,7 +132,7 @@ class StateLayout {
     state.sweep.kick = arena_.take(most_rows + places + modes_.pushes.size());
     state.sweep.speed = arena_.take(most_rows + places + modes_.pushes.size());
     state.sweep.heard = arena_.take(most_rows + modes_.outputs.size());
-    state.sweep.bundle = arena_.take(most_rows * stride_);
+    state.sweep.bundle = arena_.take(most_rows * row_);
     state.sweep.seen = arena_.take(max_block_frames * observed);
     state.forces.count = static_cast<std::size_t>(
         std::count_if(modes_.outputs.begin(), modes_.outputs.end(),
@@ -185,14 +195,16 @@ class StateLayout {
     }
     return first;
   }
-  // Returns rows of shapes.
+  // Returns rows of shapes. A shape of crossed modes has two parts.
   template <class Items, class ShapeOf>
   T* rows(const Items& items, ShapeOf&& shape_of) {
-    T* const first = arena_.take(items.size() * stride_);
+    T* const first = arena_.take(items.size() * row_);
     for (std::size_t i = 0; first != nullptr && i < items.size(); ++i) {
       const std::vector<double>& shape = shape_of(items[i]);
-      std::transform(shape.begin(), shape.end(), first + i * stride_,
-                     [](double value) { return static_cast<T>(value); });
+      for (std::size_t n = 0; n < shape.size(); ++n) {
+        const std::size_t part = n / modes_.modes;
+        first[i * row_ + part * stride_ + n % modes_.modes] = static_cast<T>(shape[n]);
+      }
     }
     return first;
   }
@@ -211,6 +223,7 @@ class StateLayout {
   std::size_t lanes_;
   std::size_t padded_;
   std::size_t stride_;
+  std::size_t row_;
   Arena<T> arena_;
 };
 
@@ -221,7 +234,7 @@ ModalKernel<T>::ModalKernel(const Program& program, const Modes& modes, std::siz
     : Kernel<T>(program, 1),
       program_(program),
       modes_(modes),
-      step_(with_isa(isa, [&]<Isa level>() { return modal_step<level, T>(); })),
+      step_(with_isa(isa, [&]<Isa level>() { return modal_step<level, T>(modes.is_crossed); })),
       rows_(modes.places.size() + modes.pushes.size() + modes.outputs.size() + most_rows),
       bundled_rows_(rows_.size()),
       indices_(modes.pushes.size() + 2 * modes.places.size() + modes.holds.size()),
@@ -253,6 +266,7 @@ void ModalKernel<T>::set_state(std::size_t, const double* x, const double* v) {
   const std::size_t places = modes_.places.size();
   // At the initial state of the model no mass is displaced.
   const bool is_start = x == program_.position.data() && v == program_.velocity.data();
+  const std::size_t block = std::size_t{modes_.modes} * program_.moving;
   for (std::size_t i = 0; i < modes_.modes; ++i) {
     double q = modes_.q[i];
     double d = modes_.d[i];
@@ -260,8 +274,8 @@ void ModalKernel<T>::set_state(std::size_t, const double* x, const double* v) {
     for (std::size_t node = 0; !is_start && node < program_.moving; ++node, ++basis) {
       const double moved = x[node] - program_.position[node];
       const double faster = v[node] - program_.velocity[node];
-      q += *basis * moved;
-      d += *basis * faster;
+      q += basis[0] * moved + (modes_.is_crossed ? basis[2 * block] * faster : 0.0);
+      d += modes_.is_crossed ? basis[block] * moved + basis[3 * block] * faster : basis[0] * faster;
     }
     state_.motion.q[i] = static_cast<T>(q);
     state_.motion.d[i] = static_cast<T>(d);
@@ -269,6 +283,16 @@ void ModalKernel<T>::set_state(std::size_t, const double* x, const double* v) {
   for (std::size_t i = 0; i < modes_.ends.size(); ++i) {
     state_.ends.x[places + i] = static_cast<T>(x[modes_.ends[i].node]);
     state_.ends.v[places + i] = static_cast<T>(v[modes_.ends[i].node]);
+  }
+  for (std::size_t p = 0; modes_.is_crossed && p < places; ++p) {
+    double position = modes_.places[p].offset;
+    double velocity = 0.0;
+    for (const ModalPlace::Mass& mass : modes_.places[p].masses) {
+      position += mass.weight * x[mass.node];
+      velocity += mass.weight * v[mass.node];
+    }
+    state_.ends.x[p] = static_cast<T>(position);
+    state_.ends.v[p] = static_cast<T>(velocity);
   }
   // Links exert no force in the first sample.
   std::fill_n(state_.motion.used, modes_.stiffness.size() + modes_.damping.size() + 1, T(0));
@@ -297,17 +321,28 @@ void ModalKernel<T>::set_state(std::size_t, const double* x, const double* v) {
 template <class T>
 void ModalKernel<T>::strike(std::size_t, std::span<const std::uint32_t> nodes,
                             std::span<const double> changes) {
+  const std::size_t block = std::size_t{modes_.modes} * program_.moving;
   for (std::size_t i = 0; i < modes_.modes; ++i) {
-    const double* const basis = modes_.basis.data() + i * program_.moving;
-    double felt = 0.0;
-    for (std::size_t k = 0; k < nodes.size(); ++k) {
-      felt += basis[nodes[k]] * changes[k];
+    const auto sum = [&](std::size_t of) {
+      const double* const basis = modes_.basis.data() + of * block + i * program_.moving;
+      double felt = 0.0;
+      for (std::size_t k = 0; k < nodes.size(); ++k) {
+        felt += basis[nodes[k]] * changes[k];
+      }
+      return felt;
+    };
+    if (modes_.is_crossed) {
+      const std::complex<double> pole(1.0 + modes_.pole[i], modes_.pole[modes_.modes + i]);
+      const std::complex<double> before = std::complex<double>(sum(4), sum(5)) / pole;
+      state_.motion.q[i] += static_cast<T>(before.real());
+      state_.motion.d[i] += static_cast<T>(before.imag());
+      continue;
     }
     const double damping = state_.motion.is_stale ? 0.0 : static_cast<double>(state_.motion.z[i]);
     const double gain =
         state_.motion.root != nullptr ? static_cast<double>(state_.motion.root[i]) : 1.0;
     // A mode that decays within a sample, such as one above half the rate, does not ring.
-    state_.motion.d[i] += damping < 1.0 ? static_cast<T>(gain * felt / (1.0 - damping)) : T(0);
+    state_.motion.d[i] += damping < 1.0 ? static_cast<T>(gain * sum(0) / (1.0 - damping)) : T(0);
   }
   wake_all();
 }
@@ -329,8 +364,8 @@ template <class T>
 double ModalKernel<T>::owed(std::size_t listener) const {
   const std::size_t places = modes_.places.size();
   const T* const row = listener < places
-                           ? state_.shapes.places + listener * state_.shapes.stride
-                           : state_.shapes.outputs + (listener - places) * state_.shapes.stride;
+                           ? state_.shapes.places + listener * state_.shapes.row
+                           : state_.shapes.outputs + (listener - places) * state_.shapes.row;
   double sum = 0.0;
   for (std::size_t i = 0; i < modes_.modes; ++i) {
     sum += std::fabs(static_cast<double>(row[i])) * static_cast<double>(state_.sleep.debt[i]);
@@ -385,7 +420,7 @@ void ModalKernel<T>::remember_peaks(const Block<T>& block) {
 template <class T>
 std::size_t ModalKernel<T>::read_positions(std::size_t, std::span<const std::uint32_t>,
                                            std::span<double> numbers) const {
-  if (numbers.size() < modes_.modes) {
+  if (numbers.size() < modes_.modes || modes_.is_crossed) {
     return 0;
   }
   for (std::size_t i = 0; i < modes_.modes; ++i) {
@@ -403,7 +438,9 @@ bool ModalKernel<T>::is_near_start(std::size_t, double bound) const {
     const double root =
         state_.motion.root != nullptr ? static_cast<double>(state_.motion.root[i]) : 1.0;
     const double moved = root * static_cast<double>(state_.motion.q[i]) - modes_.q[i];
-    sum += moved * moved;
+    const double turned =
+        modes_.is_crossed ? static_cast<double>(state_.motion.d[i]) - modes_.d[i] : 0.0;
+    sum += moved * moved + turned * turned;
   }
   return modes_.reach * std::sqrt(sum) < bound;
 }

@@ -37,12 +37,15 @@ template <class T>
 struct ModalShapes {
   std::size_t modes;
   std::size_t stride;
+  std::size_t row;      // numbers from one shape to the next; a crossed mode has two parts
   const T* stiffness;   // [share] factors, in the packs where the share has any
   const T* damping;     // the same for damping
   T* pushes;            // [push][mode], followed without a gap by places and outputs
   T* places;            // [place][mode]
   T* outputs;           // [output][mode]
   const T* unscaled;    // [push, place, output][mode] of exact modes, as the form has them
+  T* speeds;            // [place][mode] velocity of the place; crossed modes only
+  const T* pole;        // [part][mode] pole minus 1; crossed modes only
   const T* push_norm;   // [push] length of its row
   const T* place_norm;  // [place]
 };
@@ -50,6 +53,7 @@ struct ModalShapes {
 // The oscillators, d -= k q + z d, q += d, and how their coefficients change.
 struct ModalMotionPace {
   bool is_stale = true;            // k, z and compliance do not follow from `used`
+  bool is_first = false;           // the first sample of crossed modes
   std::uint32_t fresh_frames = 0;  // since set_state(); up to 2
 };
 template <class T>
@@ -229,7 +233,7 @@ using ModalStep = void (*)(const Program& program, const Modes& modes, ModalStat
                            const Block<T>& block);
 
 template <Isa isa, class T>
-ModalStep<T> modal_step();
+ModalStep<T> modal_step(bool is_crossed);
 
 template <class T>
 class ModalKernel final : public Kernel<T> {

@@ -46,7 +46,7 @@ bool measure_compliance(ModalState<T>& s, std::size_t places) {
     const T drift = T(drift_frames) * (1 + 1 / m);
     const T square = T(least_stiffness) > k ? drift * drift : 1 / k + 1 / (4 * m);
     for (std::size_t p = 0; p < places; ++p) {
-      const T shape = s.shapes.places[p * s.shapes.stride + i];
+      const T shape = s.shapes.places[p * s.shapes.row + i];
       s.ends.compliance[p] += shape * shape * square;
     }
   }

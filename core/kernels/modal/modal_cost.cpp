@@ -90,7 +90,7 @@ double operations(const Program& program, const Modes& form, const Workload& loa
   const Rows rows{.places = places + static_cast<double>(2 * force_count(form)),
                   .heard = static_cast<double>(form.outputs.size()),
                   .pushed = static_cast<double>(form.pushes.size())};
-  return all_operations(program, form.modes, rows, places, load);
+  return all_operations(program, (form.is_crossed ? 2.0 : 1.0) * form.modes, rows, places, load);
 }
 
 double least_modal_operations(const Program& program, const Workload& load) {
@@ -107,7 +107,8 @@ std::string description(const Program&, const Modes& form) {
     text = std::to_string(form.modes) + " of " + count_of(form.of, "mode", "modes") +
            ", the omitted ones at most " + in_db(form.left_out) + ",";
   }
-  text += " instead of masses, ";
+  text += form.is_crossed ? " with non-proportional damping instead of masses, "
+                          : " instead of masses, ";
   if (form.is_exact) {
     text += "exact for the continuous network, ";
   }
@@ -127,7 +128,9 @@ std::uint64_t voice_bytes(const Program& program, const Modes& form, std::uint64
       factors += share.factor.size() + widest_bytes / number_bytes;
     }
   }
-  return node_bytes(program, number_bytes) + number_bytes * (rows * form.modes + factors);
+  const std::uint64_t crossed = form.is_crossed ? 6 + rows + 4 * form.places.size() : 0;
+  return node_bytes(program, number_bytes) +
+         number_bytes * ((rows + crossed) * form.modes + factors);
 }
 
 }  // namespace ressort::kernels

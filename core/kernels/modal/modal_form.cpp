@@ -8,6 +8,7 @@
 
 #include "core/kernels/estimates.h"
 #include "core/kernels/modal/modal_body.h"
+#include "core/kernels/modal/modal_crossed.h"
 #include "core/kernels/modal/modal_worth.h"
 #include "core/laws/law.h"
 #include "core/sampled_mode.h"
@@ -38,8 +39,9 @@ constexpr double left_out_share = 0.02;   // fraction of the budget
 class ModesFinder {
  public:
   ModesFinder(const Program& program, const LinearBody& body, const model::Budget& budget,
-              const Progress& progress, bool is_exact)
+              const Progress& progress, bool is_untuned, bool is_exact)
       : program_(program),
+        is_untuned_(is_untuned),
         progress_(progress),
         body_(body),
         count_(body.count),
@@ -59,13 +61,18 @@ class ModesFinder {
     const Eigenmodes eigenmodes(body_, progress_);
     shape_ = eigenmodes.shape();
     progress_.spend(std::size_t{count_} * count_);
-    if (!eigenmodes.measure(stiffness_, progress_) || !eigenmodes.measure(damping_, progress_)) {
+    if (eigenmodes.measure(stiffness_, progress_) && eigenmodes.measure(damping_, progress_)) {
+      choose_origin(eigenmodes);
+    } else if (!cross()) {
       return std::nullopt;
     }
-    choose_origin(eigenmodes);
     place_pushes();
     place_holds();
     place_outputs();
+    if (modes_.is_crossed) {
+      keep_crossed();
+      return std::move(modes_);
+    }
     drop_idle_modes();
     for (auto* frames : {&stiffness_, &damping_}) {
       for (const Frame& frame : *frames) {
@@ -94,18 +101,52 @@ class ModesFinder {
 
   // Returns the displacement of a weighted sum of masses per displacement of each mode.
   Vector row_of(const std::vector<MassShare>& shares) const {
+    if (modes_.is_crossed) {
+      return sum_of(crossed_.shape, shares);
+    }
     Vector row(count_);
     for (const auto& [mass, share] : shares) {
       row += share * body_.root[mass] * shape_[mass];
     }
     return row;
   }
+  Vector sum_of(const std::vector<Vector>& rows, const std::vector<MassShare>& shares) const {
+    Vector sum(rows[0].size());
+    for (const auto& [mass, share] : shares) {
+      sum += share * rows[mass];
+    }
+    return sum;
+  }
   Vector shape_of(std::uint32_t node) const { return row_of(body_.readout[node].shares); }
   ModalPlace place_of(std::uint32_t node, const Vector& shape) const {
-    return {.rest = body_.readout[node].offset + dot(shape, rest_)};
+    ModalPlace place{.rest = body_.readout[node].offset};
+    if (!modes_.is_crossed) {
+      place.rest += dot(shape, rest_);
+      return place;
+    }
+    place.offset = place.rest;
+    for (const auto& [mass, share] : body_.readout[node].shares) {
+      place.rest += share * crossed_.rest[mass];
+      place.masses.push_back({mass, share});
+    }
+    place.shape = numbers_of(shape);
+    place.speed = numbers_of(sum_of(crossed_.speed, body_.readout[node].shares));
+    return place;
+  }
+  static std::vector<double> numbers_of(const Vector& row) {
+    return {std::begin(row), std::end(row)};
   }
   // Returns the force on each mode by forces on the masses.
-  Vector modal(const Vector& force) const { return in_modes(body_.root * force); }
+  Vector modal(const Vector& force) const {
+    if (modes_.is_crossed) {
+      Vector row(crossed_.push[0].size());
+      for (std::uint32_t mass = 0; mass < count_; ++mass) {
+        row += force[mass] * crossed_.push[mass];
+      }
+      return row;
+    }
+    return in_modes(body_.root * force);
+  }
   // Returns a sum over masses for each mode.
   Vector in_modes(const Vector& masses) const {
     Vector modes(count_);
@@ -149,6 +190,55 @@ class ModesFinder {
         add_push({.by = frame.is_late ? ModalPush::By::late : ModalPush::By::constant,
                   .stiffness = frame.coefficient},
                  left);
+      }
+    }
+  }
+
+  // Makes crossed modes, if damping is not proportional and nothing changes the coefficients.
+  bool cross() {
+    if (!is_untuned_) {
+      return false;
+    }
+    progress_.spend(std::size_t{8} * count_ * count_);
+    auto crossed = crossed_modes(program_, body_, modes_.is_exact, !is_plain(program_));
+    if (!crossed) {
+      return false;
+    }
+    crossed_ = *std::move(crossed);
+    modes_.is_crossed = true;
+    modes_.silence = 0.0;  // Amplitudes of crossed modes have no such bound.
+    return true;
+  }
+
+  void keep_crossed() {
+    const std::size_t count = crossed_.count;
+    modes_.modes = static_cast<std::uint32_t>(count);
+    modes_.pole = numbers_of(crossed_.pole);
+    modes_.q = numbers_of(crossed_.start[std::slice(0, count, 1)]);
+    modes_.d = numbers_of(crossed_.start[std::slice(count, count, 1)]);
+    for (const auto* rows : {&crossed_.from_position, &crossed_.from_velocity}) {
+      for (std::size_t i = 0; i < 2 * count; ++i) {
+        for (const Vector& row : *rows) {
+          modes_.basis.push_back(row[i]);
+        }
+      }
+    }
+    for (std::size_t i = 0; i < 2 * count; ++i) {
+      for (std::uint32_t mass = 0; mass < count_; ++mass) {
+        modes_.basis.push_back(crossed_.push[mass][i] / (body_.root[mass] * body_.root[mass]));
+      }
+    }
+    modes_.reach = 0.0;
+    for (const Vector& row : crossed_.shape) {
+      modes_.reach = std::max(modes_.reach, std::sqrt(dot(row, row)));
+    }
+    for (std::size_t i = 0; i < pushed_.size(); ++i) {
+      modes_.pushes[i].shape = numbers_of(pushed_[i]);
+    }
+    std::size_t part = 0;
+    for (ModalOutput& output : modes_.outputs) {
+      for (ModalForce::Part& felt : output.force.parts) {
+        felt.shape = numbers_of(felt_[part++]);
       }
     }
   }
@@ -244,8 +334,10 @@ class ModesFinder {
     for (const OutputSlot& output : program_.outputs) {
       if (output.is_force) {
         FeltForce felt = force_felt(program_, body_, output.node, rest_of_masses(), held_);
-        for (const std::vector<MassShare>& shares : felt.shares) {
-          felt_.push_back(row_of(shares));
+        for (std::size_t i = 0; i < felt.shares.size(); ++i) {
+          const bool is_speed = modes_.is_crossed && felt.force.parts[i].is_damping;
+          felt_.push_back(is_speed ? sum_of(crossed_.speed, felt.shares[i])
+                                   : row_of(felt.shares[i]));
         }
         modes_.outputs.push_back({.is_force = true, .force = std::move(felt.force)});
       } else if (body_.moves(output.node)) {
@@ -258,6 +350,9 @@ class ModesFinder {
   }
 
   Vector rest_of_masses() const {
+    if (modes_.is_crossed) {
+      return crossed_.rest;
+    }
     Vector rest(count_);
     for (std::uint32_t mass = 0; mass < count_; ++mass) {
       rest[mass] = body_.root[mass] * dot(shape_[mass], rest_);
@@ -400,6 +495,7 @@ class ModesFinder {
   }
 
   const Program& program_;
+  const bool is_untuned_;
   const Progress& progress_;
   const LinearBody& body_;
   const std::uint32_t count_;
@@ -416,18 +512,20 @@ class ModesFinder {
   std::map<std::uint32_t, std::uint32_t> end_of_;  // [node] that is no mass
   std::map<std::uint32_t, std::uint32_t> held_;    // [node] that nonlinear links hold: its end
   std::vector<std::uint32_t> kept_;                // modes
+  CrossedModes crossed_;
 };
 
 }  // namespace
 
 std::optional<Modes> modal_form(const Program& program, const model::Budget& budget,
-                                const Progress& progress, bool is_exact) {
+                                const Progress& progress, bool is_untuned, bool is_exact) {
   if (program.moving > most_modes || most_tied_masses(program) > most_tied_modes) {
     return std::nullopt;
   }
   const bool is_continuous = is_exact || budget.is_physical();
   const std::optional<LinearBody> body = linear_body(program, is_continuous);
-  return body ? ModesFinder(program, *body, budget, progress, is_continuous).find() : std::nullopt;
+  return body ? ModesFinder(program, *body, budget, progress, is_untuned, is_continuous).find()
+              : std::nullopt;
 }
 
 }  // namespace ressort::kernels

@@ -26,6 +26,15 @@ struct ModalShare {
 struct ModalPlace {
   double rest = 0.0;
   std::vector<double> shape;  // [mode]
+  // `offset` plus the weighted positions of `masses` is the initial position. Only crossed modes
+  // need it, because their initial state is that of the first sample.
+  struct Mass {
+    std::uint32_t node = 0;
+    double weight = 1.0;
+  };
+  double offset = 0.0;
+  std::vector<Mass> masses;
+  std::vector<double> speed;  // [mode] velocity; crossed modes only
 };
 
 // The nonlinear links of one run. An end is a place or, numbered on from these, one of Modes::ends.
@@ -52,7 +61,7 @@ struct ModalForce {
     std::uint32_t coefficient = 0;
     bool is_damping = false;
     double constant = 0.0;
-    std::vector<double> shape;  // [mode]
+    std::vector<double> shape;  // [mode]; with crossed modes a damper has the shape of velocities
   };
   // A position input with springs: weight * (K (x - start) + Z v).
   struct Hand {
@@ -102,6 +111,11 @@ struct ModalPush {
 // places. With masses of 1/w times the relative mass of each,
 //   d += w (push - sum of coefficient * factor * q - sum of coefficient * factor * d);  q += d
 // where the first sum is over `stiffness` and the second over `damping`.
+//
+// Crossed modes are complex modes, for damping that is not proportional (its matrix is not diagonal
+// in the eigenvectors of the stiffness). q and d are then the real and imaginary part of one number
+// y with y += pole y + w push, and a place is at the real part of the sum of shape * y. The rows of
+// crossed modes are [part][mode], and the coefficients are constant.
 struct Modes {
   static constexpr std::uint32_t own_mass = 0xffffffffu;
   std::uint32_t modes = 0;
@@ -115,7 +129,11 @@ struct Modes {
   double silence = 0.0;   // bound on the error by modes that sleep; 0: none sleeps
   std::vector<double> q;  // [mode] at the start
   std::vector<double> d;
-  std::vector<double> basis;  // [mode][mass] share of a mass's displacement or velocity in a mode's
+  // [mode][mass] contribution of a mass's displacement or velocity to a mode's; of crossed modes
+  // [displacement, velocity, push][part][mode][mass], one sample later
+  std::vector<double> basis;
+  bool is_crossed = false;
+  std::vector<double> pole;  // [part][mode] minus 1; crossed modes only
   std::vector<ModalShare> stiffness;
   std::vector<ModalShare> damping;
   std::vector<ModalPush> pushes;
@@ -131,17 +149,19 @@ inline constexpr std::size_t most_tied_modes = 1200;
 inline constexpr std::size_t most_modes = 4096;
 
 // Makes the modal form, if all linear links share their eigenvectors for all values of the
-// parameters (proportional damping; Caughey and O'Kelly, J. Appl. Mech. 32, 1965). Empty if they do
-// not, if parameters change masses separately or move points on macros, and for audio parameters,
-// too many passive links and more than most_tied_modes masses. O(n^3): about 20 ms for 300 masses,
-// 0.1 s for 600.
+// parameters (proportional damping). Otherwise makes crossed modes (modal_crossed.h) if nothing
+// changes the coefficients; `is_untuned` means that no key and no bend does. Empty if neither is
+// possible, if parameters change masses separately or move points on macros, and for audio
+// parameters, too many passive links and more than most_tied_modes masses. O(n^3): about 20 ms for
+// 300 masses, 0.1 s for 600.
 //
 // With a budget of cents or decay, or with `is_exact`, the modes are those of the continuous
 // network, without modes above 0.45 of the rate. With a budget of silence, modes that are never
-// audible are left out, and the others are sorted and may sleep, unless an output is a force.
-// [any thread but audio]
+// audible are left out, and the others are sorted and may sleep, unless they are crossed or an
+// output is a force. [any thread but audio]
 std::optional<Modes> modal_form(const Program& program, const model::Budget& budget = {},
-                                const Progress& progress = {}, bool is_exact = false);
+                                const Progress& progress = {}, bool is_untuned = false,
+                                bool is_exact = false);
 
 // Returns a lower bound of the operations, before the form is made.
 double least_modal_operations(const Program& program, const Workload& load);

@@ -15,7 +15,7 @@ namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 // Computes the displacement of each listener and link by a unit push of each link, for w = 1.
-template <class T>
+template <bool Crossed, class T>
 void measure_replies(ModalState<T>& s, std::size_t places, std::size_t outputs) {
   for (std::size_t l = 0; l < places + outputs; ++l) {
     const T* const row = listener(s, places, l);
@@ -24,7 +24,7 @@ void measure_replies(ModalState<T>& s, std::size_t places, std::size_t outputs) 
       for (const bool is_b : {false, true}) {
         const std::uint32_t end = is_b ? s.passive.links[i].ends.b : s.passive.links[i].ends.a;
         if (end < places) {
-          const T moved = reply(s, row, s.shapes.places + end * s.shapes.stride);
+          const T moved = reply<Crossed>(s, row, s.shapes.places + end * s.shapes.row);
           sum += is_b ? -moved : moved;
         }
       }

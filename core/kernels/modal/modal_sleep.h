@@ -40,8 +40,8 @@ V after_check(const ModalState<T>& s, V kept) {
 
 template <class T>
 const T* listener(const ModalState<T>& s, std::size_t places, std::size_t l) {
-  return l < places ? s.shapes.places + l * s.shapes.stride
-                    : s.shapes.outputs + (l - places) * s.shapes.stride;
+  return l < places ? s.shapes.places + l * s.shapes.row
+                    : s.shapes.outputs + (l - places) * s.shapes.row;
 }
 
 // Updates the ringing of the modes from the current coefficients. If a stiffness has fallen, the

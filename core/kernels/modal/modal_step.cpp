@@ -1,6 +1,4 @@
 // The modal kernel's computation of a block, compiled for each instruction set.
-#include <utility>
-
 #include "core/kernels/modal/modal_bounds.h"
 #include "core/kernels/modal/modal_exact.h"
 #include "core/kernels/modal/modal_passive.h"
@@ -17,7 +15,7 @@ constexpr std::uint32_t nowhere = 0xffffffffu;
 // Computes one block: divides it into parts with constant and with changing coefficients, decides
 // for each part which links can act, and advances the modes sample by sample (bound) or in runs
 // (free).
-template <class T>
+template <class T, bool Crossed>
 struct ModalPlayer {
   const Modes& modes;
   ModalState<T>& s;
@@ -36,7 +34,7 @@ struct ModalPlayer {
       std::size_t frames = moving > 0 && moving < left ? moving : left;
       if (moving > 0) {
         wake();
-        if (modes.is_exact) {
+        if (modes.is_exact && !Crossed) {
           frames = begin_exact(frames);
         }
         hold_all();
@@ -71,7 +69,7 @@ struct ModalPlayer {
     if (s.motion.is_stale) {
       mix(0, s.motion.k, s.motion.z);
       mix_forces();
-      s.ends.has_bounds = measure_compliance(s, places);
+      s.ends.has_bounds = !Crossed && measure_compliance(s, places);
       if (s.sleep.silence > 0) {
         measure_ringing(s);
       }
@@ -172,7 +170,7 @@ struct ModalPlayer {
     for (std::size_t n = first; n < first + frames; ++n) {
       if constexpr (Moving) {
         advance(s.ramps);
-        if (modes.is_exact) {
+        if (modes.is_exact && !Crossed) {
           advance_exact();
         } else {
           mix(0, s.motion.k, s.motion.z);
@@ -210,15 +208,24 @@ struct ModalPlayer {
     for (std::uint32_t p = 0; p < places; ++p) {
       s.ends.kicked[p] = 0;
       if (s.held.row_of[p] != nowhere) {
-        locate(p);
+        locate_at_first(p);
       }
     }
   }
+
+  // The state of crossed modes is one sample ahead at first. Until then a place stays where
+  // set_state() has put it.
+  void locate_at_first(std::uint32_t p) {
+    if (!Crossed || *s.motion.used != 0) {
+      locate(p);
+    }
+  }
   void locate(std::uint32_t p) {
-    const T* const shape = s.shapes.places + p * s.shapes.stride;
-    s.ends.x[p] = static_cast<T>(modes.places[p].rest) + along(s, shape, s.motion.q);
-    if (s.passive.count > 0) {
-      s.ends.v[p] = along(s, shape, s.motion.d);
+    const std::size_t at = p * s.shapes.row;
+    s.ends.x[p] = static_cast<T>(modes.places[p].rest) + read<Crossed>(s, s.shapes.places + at);
+    if (Crossed || s.passive.count > 0) {
+      s.ends.v[p] = Crossed ? read<Crossed>(s, s.shapes.speeds + at)
+                            : along(s, s.shapes.places + at, s.motion.d);
     }
   }
 
@@ -232,16 +239,16 @@ struct ModalPlayer {
     }
     std::size_t rows = 0;
     for (std::size_t r = 0; r < s.held.places; ++r) {
-      s.sweep.rows[rows++] = s.shapes.places + s.held.place_of[r] * s.shapes.stride;
+      s.sweep.rows[rows++] = s.shapes.places + s.held.place_of[r] * s.shapes.row;
     }
     for (std::size_t r = 0; r < s.inputs.pushing; ++r) {
-      s.sweep.rows[rows++] = s.shapes.pushes + s.inputs.push_of[r] * s.shapes.stride;
+      s.sweep.rows[rows++] = s.shapes.pushes + s.inputs.push_of[r] * s.shapes.row;
     }
     for (std::size_t o = 0; o < outputs; ++o) {
-      s.sweep.rows[rows++] = s.shapes.outputs + o * s.shapes.stride;
+      s.sweep.rows[rows++] = s.shapes.outputs + o * s.shapes.row;
     }
     if (s.held.places + s.inputs.pushing <= most_kicked) {
-      bundle(s, s.held.places + s.inputs.pushing + heard_along());
+      bundle<Crossed>(s, s.held.places + s.inputs.pushing + heard_along());
     }
   }
   // Returns how many outputs a sweep computes. The others are summed one by one.
@@ -263,21 +270,21 @@ struct ModalPlayer {
     if (acts && s.sleep.awake < modes.modes) {
       wake();
       if (kicked <= most_kicked) {
-        bundle(s, s.sweep.bundled);
+        bundle<Crossed>(s, s.sweep.bundled);
       }
     }
     if (kicked > most_kicked) {
-      sweep_rows(s, kicked, outputs);
+      sweep_rows<Crossed>(s, kicked, outputs);
       return;
     }
     if (s.passive.shoves_later) {
       std::copy_n(s.passive.shove, kicked, s.sweep.kick);
-      sweep_sample<true>(s, kicked, heard_along());
+      sweep_sample<Crossed, true>(s, kicked, heard_along());
     } else {
-      sweep_sample<false>(s, kicked, heard_along());
+      sweep_sample<Crossed, false>(s, kicked, heard_along());
     }
     for (std::size_t o = heard_along(); o < outputs; ++o) {
-      s.sweep.heard[o] = along(s, s.shapes.outputs + o * s.shapes.stride, s.motion.q);
+      s.sweep.heard[o] = read<Crossed>(s, s.shapes.outputs + o * s.shapes.row);
     }
   }
 
@@ -286,6 +293,9 @@ struct ModalPlayer {
       const std::uint32_t p = s.held.place_of[r];
       s.ends.v[p] = s.sweep.speed[r];
       s.ends.x[p] += s.sweep.speed[r];
+      if (Crossed && s.motion.is_first) {
+        locate(p);
+      }
       s.ends.force[p] = 0;
     }
   }
@@ -336,7 +346,8 @@ struct ModalPlayer {
   T force_of(const ModalForce& force, std::size_t number, std::size_t n) const {
     const T* const row = s.forces.rows + 2 * number * s.shapes.stride;
     T sum = s.forces.still[number] +
-            (along(s, row, s.motion.q) + along(s, row + s.shapes.stride, s.motion.d));
+            (Crossed ? read<Crossed>(s, row)
+                     : along(s, row, s.motion.q) + along(s, row + s.shapes.stride, s.motion.d));
     const T* const value = block.value + n * inputs;
     const T* const velocity = block.velocity + n * inputs;
     for (const ModalForce::Hand& hand : force.hands) {
@@ -361,7 +372,7 @@ struct ModalPlayer {
     std::size_t rows = 0;
     for (std::size_t o = 0; o < outputs; ++o) {
       if (modes.outputs[o].is_place) {
-        s.sweep.rows[rows++] = s.shapes.outputs + o * s.shapes.stride;
+        s.sweep.rows[rows++] = s.shapes.outputs + o * s.shapes.row;
       }
     }
     const std::size_t heard = rows;
@@ -407,8 +418,8 @@ struct ModalPlayer {
   void suspect(std::uint32_t end, std::size_t& rows) {
     if (end < places && s.held.row_of[end] == nowhere) {
       s.held.row_of[end] = static_cast<std::uint32_t>(rows);
-      s.sweep.rows[rows++] = s.shapes.places + end * s.shapes.stride;
-      locate(end);
+      s.sweep.rows[rows++] = s.shapes.places + end * s.shapes.row;
+      locate_at_first(end);
     }
   }
 
@@ -477,9 +488,9 @@ struct ModalPlayer {
       s.sweep.rows[Kicked + r] = r < rows ? s.sweep.rows[r] : nullptr;
     }
     for (std::size_t r = 0; r < Kicked; ++r) {
-      s.sweep.rows[r] = s.shapes.pushes + s.inputs.push_of[r] * s.shapes.stride;
+      s.sweep.rows[r] = s.shapes.pushes + s.inputs.push_of[r] * s.shapes.row;
     }
-    bundle(s, Kicked + Heard);
+    bundle<Crossed>(s, Kicked + Heard);
     std::size_t n = 0;
     for (; n + Samples <= frames; n += Samples) {
       run_samples<Samples, Kicked, Heard>(first, n, rows);
@@ -496,7 +507,7 @@ struct ModalPlayer {
             s.inputs.amplitude[(first + n + m) * pushes + s.inputs.push_of[r]];
       }
     }
-    sweep<Samples, Kicked, false, Heard, false>(s);
+    sweep<Samples, Kicked, false, Heard, Crossed, false>(s);
     for (std::size_t m = 0; m < Samples; ++m) {
       for (std::size_t r = 0; r < rows; ++r) {
         s.sweep.seen[r * max_block_frames + n + m] = s.sweep.heard[m * Heard + r];
@@ -694,14 +705,14 @@ struct ModalPlayer {
   // Adds displacements that were deferred.
   void shove_now() {
     if (std::exchange(s.passive.shoves_later, false)) {
-      shove_rows(s);
+      shove_rows<Crossed>(s);
     }
   }
 
   // Updates the matrices at the start of a part, or in each sample with changing coefficients.
   void measure_passive() {
     if (s.passive.is_reply_stale) {
-      measure_replies(s, places, outputs);
+      measure_replies<Crossed>(s, places, outputs);
       s.passive.is_reply_stale = false;
     }
     s.passive.is_straight_stale = true;
@@ -779,11 +790,11 @@ struct ModalPlayer {
     if (s.sleep.awake < modes.modes) {
       wake();
       if (s.held.places + s.inputs.pushing <= most_kicked) {
-        bundle(s, s.sweep.bundled);
+        bundle<Crossed>(s, s.sweep.bundled);
       }
     }
     if (!s.passive.shoves_later) {
-      shove_rows(s);
+      shove_rows<Crossed>(s);
     }
   }
 
@@ -826,6 +837,18 @@ struct ModalPlayer {
   void mix(std::size_t ahead, T* k, T* z) {
     const T w =
         modes.inverse_mass == Modes::own_mass ? T(1) : coefficient(modes.inverse_mass, ahead);
+    if constexpr (Crossed) {
+      // The initial state of crossed modes is that of the first sample. Only pushes move the modes
+      // in this sample.
+      s.motion.is_first = *s.motion.used == 0;
+      const T here = s.motion.is_first ? T(0) : T(1);
+      for (std::size_t i = 0; i < all_packs(s); ++i) {
+        packs(k)[i] = here * packs(s.shapes.pole)[i];
+        packs(z)[i] = here * packs(s.shapes.pole + s.shapes.stride)[i];
+      }
+      *s.motion.used = w;
+      return;
+    }
     T* used = mix(modes.stiffness, s.shapes.stiffness, ahead, w, k, s.motion.used);
     used = mix(modes.damping, s.shapes.damping, ahead, w, z, used);
     *used = w;
@@ -866,10 +889,13 @@ struct ModalPlayer {
       T still = 0;
       for (const ModalForce::Part& part : output.force.parts) {
         const T c = coefficient(part.coefficient);
-        T* const row = rows + (part.is_damping ? s.shapes.stride : 0);
+        // Crossed modes have one row of two parts; dampers use the shape of velocities.
         for (std::size_t i = 0; i < part.shape.size(); ++i) {
-          const T root = modes.is_exact ? s.motion.root[i] : T(1);
-          row[i] += c * root * static_cast<T>(part.shape[i]);
+          const std::size_t mode = i % modes.modes;
+          const bool is_second = Crossed ? i >= modes.modes : part.is_damping;
+          const T root = modes.is_exact && !Crossed ? s.motion.root[mode] : T(1);
+          rows[(is_second ? s.shapes.stride : 0) + mode] +=
+              c * root * static_cast<T>(part.shape[i]);
         }
         still += c * static_cast<T>(part.constant);
       }
@@ -898,9 +924,9 @@ struct ModalPlayer {
   }
 };
 
-template <class T>
+template <class T, bool Crossed>
 void step(const Program& program, const Modes& modes, ModalState<T>& state, const Block<T>& block) {
-  ModalPlayer<T>{modes, state, program, block}.play();
+  ModalPlayer<T, Crossed>{modes, state, program, block}.play();
 }
 
 }  // namespace
@@ -909,13 +935,13 @@ void step(const Program& program, const Modes& modes, ModalState<T>& state, cons
 namespace ressort::kernels {
 
 template <>
-ModalStep<float> modal_step<Isa::RESSORT_ISA, float>() {
-  return RESSORT_ISA::step<float>;
+ModalStep<float> modal_step<Isa::RESSORT_ISA, float>(bool is_crossed) {
+  return is_crossed ? RESSORT_ISA::step<float, true> : RESSORT_ISA::step<float, false>;
 }
 
 template <>
-ModalStep<double> modal_step<Isa::RESSORT_ISA, double>() {
-  return RESSORT_ISA::step<double>;
+ModalStep<double> modal_step<Isa::RESSORT_ISA, double>(bool is_crossed) {
+  return is_crossed ? RESSORT_ISA::step<double, true> : RESSORT_ISA::step<double, false>;
 }
 
 }  // namespace ressort::kernels

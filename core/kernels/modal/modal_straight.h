@@ -11,7 +11,6 @@
 #pragma once
 
 #include <algorithm>
-#include <utility>
 
 #include "core/kernels/modal/modal_sweep.h"
 #include "core/kernels/passive/joint.h"

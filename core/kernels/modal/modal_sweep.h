@@ -1,6 +1,8 @@
 // core/kernels: the passes over all modes of a ModalState. A part of modal_step.cpp.
 #pragma once
 
+#include <utility>
+
 #include "core/kernels/modal/modal.h"
 
 namespace ressort::kernels::RESSORT_ISA {
@@ -9,6 +11,9 @@ namespace {
 constexpr std::size_t most_kicked = 8;  // rows of one sweep
 constexpr std::size_t most_heard = 8;
 constexpr std::size_t most_shoved = 4;
+
+template <bool Crossed>
+constexpr std::size_t parts = Crossed ? 2 : 1;  // numbers per mode of a shape
 
 template <class T>
 using ModePack = Pack<T, vector_bytes(Isa::RESSORT_ISA)>;
@@ -57,12 +62,22 @@ T along(const ModalState<T>& s, const T* row, const T* numbers) {
   return total<T>(even + odd);
 }
 
+// Returns the displacement along a row; for crossed modes, the real part of the product.
+template <bool Crossed, class T>
+T read(const ModalState<T>& s, const T* row) {
+  const T even = along(s, row, s.motion.q);
+  return Crossed ? even - along(s, row + s.shapes.stride, s.motion.d) : even;
+}
+
 // Returns the displacement along one row by a unit push along another.
-template <class T>
+template <bool Crossed, class T>
 T reply(const ModalState<T>& s, const T* one, const T* other) {
   ModePack<T> sum{};
   for (std::size_t i = 0; i < all_packs(s); ++i) {
     sum += packs(one)[i] * packs(other)[i];
+    if constexpr (Crossed) {
+      sum -= packs(one + s.shapes.stride)[i] * packs(other + s.shapes.stride)[i];
+    }
   }
   return total<T>(sum);
 }
@@ -74,9 +89,9 @@ void keep(const ModalState<T>& s, T* to, const T* from) {
   }
 }
 
-// Interleaves the rows of a sweep, [pack][row], so that the sweep reads memory in one stream. Null
-// is a row of zeros.
-template <class T>
+// Interleaves the rows of a sweep, [pack][row][part], so that the sweep reads memory in one stream.
+// Null is a row of zeros.
+template <bool Crossed, class T>
 void bundle(ModalState<T>& s, std::size_t rows) {
   bool is_same = rows == s.sweep.bundled && s.sleep.swept <= s.sweep.bundled_modes;
   for (std::size_t r = 0; r < rows && is_same; ++r) {
@@ -89,23 +104,29 @@ void bundle(ModalState<T>& s, std::size_t rows) {
   s.sweep.bundled_modes = s.sleep.swept;
   for (std::size_t r = 0; r < rows; ++r) {
     s.sweep.bundled_rows[r] = s.sweep.rows[r];
-    const T* const row = s.sweep.rows[r];
-    for (std::size_t i = 0; i < pack_count(s); ++i) {
-      packs(s.sweep.bundle)[i * rows + r] = row == nullptr ? ModePack<T>{} : packs(row)[i];
+    for (std::size_t part = 0; part < parts<Crossed>; ++part) {
+      const T* const row =
+          s.sweep.rows[r] == nullptr ? nullptr : s.sweep.rows[r] + part * s.shapes.stride;
+      for (std::size_t i = 0; i < pack_count(s); ++i) {
+        packs(s.sweep.bundle)[(i * rows + r) * parts<Crossed> + part] =
+            row == nullptr ? ModePack<T>{} : packs(row)[i];
+      }
     }
   }
 }
 
 // Advances all modes by `Samples` samples. Each mode is an oscillator stepped by symplectic Euler:
 //   d[n+1] = d[n] - lZ d[n] - lK q[n] + kicks,   q[n+1] = q[n] + d[n+1]
+// or, if Crossed, y[n+1] = y[n] + (pole - 1) y[n] + kicks for y = q + i d.
 // The first `Kicked` rows of the bundle add s.sweep.kick [sample][row] and, if Felt, return their
 // velocity in s.sweep.speed [row]. The next `Heard` rows return their displacement in s.sweep.heard
 // [sample][row]. If Shoved, the kicks are the displacements by passive links at the end of the
 // sample before, which are added to q and d alike.
-template <std::size_t Samples, std::size_t Kicked, bool Felt, std::size_t Heard, bool Shoved,
-          class T>
+template <std::size_t Samples, std::size_t Kicked, bool Felt, std::size_t Heard, bool Crossed,
+          bool Shoved, class T>
 void sweep(ModalState<T>& s) {
   using V = ModePack<T>;
+  constexpr std::size_t width = parts<Crossed>;
   V* const q = packs(s.motion.q);
   V* const d = packs(s.motion.d);
   const V* const k = packs(s.motion.k);
@@ -134,35 +155,59 @@ void sweep(ModalState<T>& s) {
     const V zi = z[i];
 #pragma GCC unroll 16
     for (std::size_t n = 0; n < Samples; ++n) {
-      // Two sums of the kicks, to hide their latency: q and d depend on each other.
+      // Two sums of the kicks, to hide their latency: q and d depend on each other. Crossed modes
+      // have a sum for each part.
       V f[2] = {};
 #pragma GCC unroll 16
       for (std::size_t r = 0; r < Kicked; ++r) {
-        f[r % 2] += kick[n * Kicked + r] * row[r];
+        if constexpr (Crossed) {
+          f[0] += kick[n * Kicked + r] * row[width * r];
+          f[1] += kick[n * Kicked + r] * row[width * r + 1];
+        } else {
+          f[r % 2] += kick[n * Kicked + r] * row[r];
+        }
       }
-      const V sum = Kicked > 1 ? f[0] + f[1] : f[0];
-      if constexpr (Shoved) {
-        qi += sum;
-        di += sum;
+      if constexpr (Crossed) {
+        if constexpr (Shoved) {
+          qi += std::exchange(f[0], V{});
+          di += std::exchange(f[1], V{});
+        }
+        f[0] += ki * qi - zi * di;
+        f[1] += ki * di + zi * qi;
+        qi += f[0];
+        di += f[1];
+      } else {
+        const V sum = Kicked > 1 ? f[0] + f[1] : f[0];
+        if constexpr (Shoved) {
+          qi += sum;
+          di += sum;
+        }
+        di -= zi * di;
+        di -= ki * qi;
+        if constexpr (Kicked > 0 && !Shoved) {
+          di += sum;
+        }
+        qi += di;
       }
-      di -= zi * di;
-      di -= ki * qi;
-      if constexpr (Kicked > 0 && !Shoved) {
-        di += sum;
-      }
-      qi += di;
 #pragma GCC unroll 16
       for (std::size_t r = 0; r < Kicked && Felt; ++r) {
-        speed[r] += row[r] * di;
+        if constexpr (Crossed) {
+          speed[r] += row[width * r] * f[0] - row[width * r + 1] * f[1];
+        } else {
+          speed[r] += row[r] * di;
+        }
       }
 #pragma GCC unroll 16
       for (std::size_t r = 0; r < Heard; ++r) {
-        heard[n * Heard + r] += row[Kicked + r] * qi;
+        heard[n * Heard + r] += row[width * (Kicked + r)] * qi;
+        if constexpr (Crossed) {
+          heard[n * Heard + r] -= row[width * (Kicked + r) + 1] * di;
+        }
       }
     }
     q[i] = qi;
     d[i] = di;
-    row += Kicked + Heard;
+    row += width * (Kicked + Heard);
   }
 #pragma GCC unroll 16
   for (std::size_t r = 0; r < Kicked && Felt; ++r) {
@@ -175,38 +220,38 @@ void sweep(ModalState<T>& s) {
 }
 
 // Advances by one sample, with up to most_kicked rows that are kicked and two that are heard.
-template <std::size_t Heard, bool Shoved, class T>
+template <std::size_t Heard, bool Crossed, bool Shoved, class T>
 void sweep_sample(ModalState<T>& s, std::size_t kicked) {
   switch (kicked) {
     case 0:
-      return sweep<1, 0, true, Heard, Shoved>(s);
+      return sweep<1, 0, true, Heard, Crossed, Shoved>(s);
     case 1:
-      return sweep<1, 1, true, Heard, Shoved>(s);
+      return sweep<1, 1, true, Heard, Crossed, Shoved>(s);
     case 2:
-      return sweep<1, 2, true, Heard, Shoved>(s);
+      return sweep<1, 2, true, Heard, Crossed, Shoved>(s);
     case 3:
-      return sweep<1, 3, true, Heard, Shoved>(s);
+      return sweep<1, 3, true, Heard, Crossed, Shoved>(s);
     case 4:
-      return sweep<1, 4, true, Heard, Shoved>(s);
+      return sweep<1, 4, true, Heard, Crossed, Shoved>(s);
     case 5:
-      return sweep<1, 5, true, Heard, Shoved>(s);
+      return sweep<1, 5, true, Heard, Crossed, Shoved>(s);
     case 6:
-      return sweep<1, 6, true, Heard, Shoved>(s);
+      return sweep<1, 6, true, Heard, Crossed, Shoved>(s);
     case 7:
-      return sweep<1, 7, true, Heard, Shoved>(s);
+      return sweep<1, 7, true, Heard, Crossed, Shoved>(s);
     default:
-      return sweep<1, most_kicked, true, Heard, Shoved>(s);
+      return sweep<1, most_kicked, true, Heard, Crossed, Shoved>(s);
   }
 }
-template <bool Shoved, class T>
+template <bool Crossed, bool Shoved, class T>
 void sweep_sample(ModalState<T>& s, std::size_t kicked, std::size_t heard) {
   switch (heard) {
     case 0:
-      return sweep_sample<0, Shoved>(s, kicked);
+      return sweep_sample<0, Crossed, Shoved>(s, kicked);
     case 1:
-      return sweep_sample<1, Shoved>(s, kicked);
+      return sweep_sample<1, Crossed, Shoved>(s, kicked);
     default:
-      return sweep_sample<2, Shoved>(s, kicked);
+      return sweep_sample<2, Crossed, Shoved>(s, kicked);
   }
 }
 
@@ -218,7 +263,7 @@ void kick_row(const ModalState<T>& s, T* load, const T* row, T kick) {
   }
 }
 // Adds s.passive.shove along `Rows` rows of places to q and d. Rows beyond the last add 0.
-template <std::size_t Rows, class T>
+template <bool Crossed, std::size_t Rows, class T>
 void shove_some(ModalState<T>& s, std::size_t first) {
   using V = ModePack<T>;
   const T* row[Rows];
@@ -230,47 +275,63 @@ void shove_some(ModalState<T>& s, std::size_t first) {
     shove[r] = V{} + (is_there ? s.passive.shove[first + r] : T(0));
   }
   for (std::size_t i = 0; i < pack_count(s); ++i) {
-    V sum{};
+    V q{};
+    V d{};
 #pragma GCC unroll 16
     for (std::size_t r = 0; r < Rows; ++r) {
-      sum += shove[r] * packs(row[r])[i];
+      q += shove[r] * packs(row[r])[i];
+      if constexpr (Crossed) {
+        d += shove[r] * packs(row[r] + s.shapes.stride)[i];
+      }
     }
-    packs(s.motion.q)[i] += sum;
-    packs(s.motion.d)[i] += sum;
+    packs(s.motion.q)[i] += q;
+    packs(s.motion.d)[i] += Crossed ? d : q;
   }
 }
-template <class T>
+template <bool Crossed, class T>
 void shove_rows(ModalState<T>& s) {
   for (std::size_t row = 0; row < s.held.places; row += most_shoved) {
     if (row + 1 == s.held.places) {
-      shove_some<1>(s, row);
+      shove_some<Crossed, 1>(s, row);
     } else {
-      shove_some<most_shoved>(s, row);
+      shove_some<Crossed, most_shoved>(s, row);
     }
   }
 }
-template <class T>
+template <bool Crossed, class T>
 void sweep_rows(ModalState<T>& s, std::size_t kicked, std::size_t heard) {
-  T* const load = s.sweep.load;
+  T* const load[2] = {s.sweep.load, s.sweep.load + s.shapes.stride};
   for (std::size_t i = 0; i < pack_count(s); ++i) {
     const auto k = packs(s.motion.k)[i];
     const auto z = packs(s.motion.z)[i];
     const auto q = packs(s.motion.q)[i];
     const auto d = packs(s.motion.d)[i];
-    packs(load)[i] = -(k * q + z * d);
+    packs(load[0])[i] = Crossed ? k * q - z * d : -(k * q + z * d);
+    if constexpr (Crossed) {
+      packs(load[1])[i] = k * d + z * q;
+    }
   }
   for (std::size_t r = 0; r < kicked; ++r) {
-    kick_row(s, load, s.sweep.rows[r], s.sweep.kick[r]);
+    for (std::size_t part = 0; part < parts<Crossed>; ++part) {
+      kick_row(s, load[part], s.sweep.rows[r] + part * s.shapes.stride, s.sweep.kick[r]);
+    }
   }
   for (std::size_t i = 0; i < pack_count(s); ++i) {
-    packs(s.motion.d)[i] += packs(load)[i];
-    packs(s.motion.q)[i] += packs(s.motion.d)[i];
+    if constexpr (Crossed) {
+      packs(s.motion.q)[i] += packs(load[0])[i];
+      packs(s.motion.d)[i] += packs(load[1])[i];
+    } else {
+      packs(s.motion.d)[i] += packs(load[0])[i];
+      packs(s.motion.q)[i] += packs(s.motion.d)[i];
+    }
   }
   for (std::size_t r = 0; r < kicked; ++r) {
-    s.sweep.speed[r] = along(s, s.sweep.rows[r], s.motion.d);
+    s.sweep.speed[r] = Crossed ? along(s, s.sweep.rows[r], load[0]) -
+                                     along(s, s.sweep.rows[r] + s.shapes.stride, load[1])
+                               : along(s, s.sweep.rows[r], s.motion.d);
   }
   for (std::size_t r = 0; r < heard; ++r) {
-    s.sweep.heard[r] = along(s, s.sweep.rows[kicked + r], s.motion.q);
+    s.sweep.heard[r] = read<Crossed>(s, s.sweep.rows[kicked + r]);
   }
 }
 

@@ -79,7 +79,7 @@ TEST_CASE("a T60 parameter sets a mode's decay with exact modes at any pitch", "
       "@ring param 1.\n@b body 2. p q\n@b1 mode @b 400. 2. 1. 0.\n"
       "@b2 mode @b 1100. 0.5*ring 0. 1.\n@in1 frcInput [@b q]\n@out1 posOutput [@b q]\n";
   Program program = make_program(network_of(text), 48000.0, true);
-  const auto modes = modal_form(program, {}, {}, true);
+  const auto modes = modal_form(program, {}, {}, false, true);
   REQUIRE(modes);
   program.form = *modes;
   for (const double factor : {1.0, 9.0}) {

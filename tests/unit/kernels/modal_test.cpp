@@ -63,7 +63,7 @@ TEST_CASE("Modes of a body are independent of each other", "[modal]") {
             std::to_string(i) + "] 1.\n";
   }
   text += "@in1 frcInput [@b p]\n@out1 posOutput [@b p]\n";
-  const auto modes = modal_form(make_program(network_of(text), 44100.0, true), {}, {}, true);
+  const auto modes = modal_form(make_program(network_of(text), 44100.0, true), {}, {}, false, true);
   REQUIRE(modes);
   REQUIRE(modes->modes == 300);
   std::vector<int> turned(300);
