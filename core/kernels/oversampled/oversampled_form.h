@@ -15,7 +15,7 @@ struct Oversampled {
   std::uint32_t times = 1;
 };
 
-inline constexpr std::uint32_t most_oversampling = 32;
+inline constexpr std::uint32_t most_oversampling = 64;
 
 // Returns the Program at `times` the rate, in the direct form.
 Program oversampled_program(const Program& program, std::uint32_t times);

@@ -109,7 +109,7 @@ TEST_CASE("The figure of a preset has a cell for each time and pitch and a dot f
   CHECK(script.find("\n-96 -20 -30 \n-40 -50 -60 \n") != script.npos);
   CHECK(script.find("\n0.5 8.78136\nEOD") != script.npos);  // log2(440)
   CHECK(script.find("-200") == script.npos);
-  CHECK(plot::to_script(gallery_figure({preset})).find("set title 'a ''b''''") != script.npos);
+  CHECK(plot::to_script(gallery_figure({preset})).find("set title 'a ''b'''") != script.npos);
 }
 
 }  // namespace ressort::gallery_test
