@@ -1,6 +1,7 @@
 // core/laws: the list of force laws, with their templates. To add a law: write its file beside this
-// one, include it, and add its row to the list. The property tests in tests/unit/laws report
-// facts that contradict each other. Include law.h instead where the facts are enough.
+// one, include it, and add its row to the list; core/README.md describes the steps. The property
+// tests in tests/unit/laws report facts that contradict each other. Include law.h instead where the
+// facts are enough.
 #pragma once
 
 #include <tuple>
@@ -47,6 +48,7 @@ enum class Law : std::uint8_t { RESSORT_EACH_LAW(RESSORT_LAW_NAME) };
 //   V passive(LinkState)             the passive force of a link that acts alone
 //   Steady<V> steady(LinkState)      the part of it that does not depend on the solution
 //   Slope<V> gradient(before, step)  the rest, for a change of distance `step` in two samples
+//                                    passive = steady.force + steady.damping step + gradient
 //   V curved(d)                      the potential of the rest, if the law contains a spring
 //   Slope<V> friction(v)             only of friction laws: the force and its slope
 //   Slope<V> inside(before)          only if is_straight: force and slope while it acts

@@ -273,6 +273,28 @@ TEST_CASE("a discrete gradient does not create energy", "[laws]") {
   });
 }
 
+TEST_CASE("the passive force of every law is its steady part and its gradient", "[laws]") {
+  // Links that share a mass and the FAUST export use these two parts, a link alone `passive`:
+  // f = force + damping s + gradient(before, s), where s is the change of distance in two samples.
+  each_law([&](auto type, Random& random) {
+    for (int i = 0; i < draws; ++i) {
+      const auto law = law_with<decltype(type)>(any_arguments(type.facts, random));
+      laws::LinkState<double> link{.now = random.uniform(-1.0, 1.0),
+                                   .speed = random.uniform(-0.3, 0.3),
+                                   .gamma = random.uniform(0.0, 3.0)};
+      link.fast = link.speed + random.uniform(-0.1, 0.1);
+      link.free = link.now + link.fast;
+      const double f = law.passive(link);
+      const double way = link.free - link.gamma * f - link.before();
+      const auto steady = law.steady(link);
+      const double parts =
+          steady.force + steady.damping * way + law.gradient(link.before(), way).value;
+      CAPTURE(link.now, link.speed, link.free, link.gamma, way);
+      CHECK(f == Approx(parts).margin(1e-9));
+    }
+  });
+}
+
 TEST_CASE("every law has a finite force if some of its arguments are 0", "[laws]") {
   constexpr double motions[] = {0.0, 1e-9, 1e-3, 1.0, 1e6};
   each_law([&](auto type, Random& random) {
