@@ -7,7 +7,7 @@ list(TRANSFORM ressort_fuzzers PREPEND fuzz_ OUTPUT_VARIABLE ressort_deep_tests)
 list(APPEND ressort_deep_tests arm everything_sanitized everything_more forms_everywhere
   accuracy_everywhere silence_everywhere modes_everywhere calculix_everywhere bodies_everywhere
   bells_everywhere heard_pitch_everywhere thorough bench lint scenes_more abuse_long callback_minute bows settings_more edits_more
-  flights_everywhere server_killed installed soak)
+  flights_everywhere server_killed installed soak races)
 list(LENGTH ressort_deep_tests ressort_deep_count)
 
 # Adds a deep test that takes about SECONDS on two cores.
@@ -106,3 +106,31 @@ add_deep_test(abuse_long 300 $<TARGET_FILE:ressort_abuse> 60 2)
 # Format, clang-tidy and duplicate type names, in the last change, or everywhere if there is time.
 add_deep_test(lint 240 sh -c
   "exec ${CMAKE_CURRENT_SOURCE_DIR}/lint $([ -n \"$RESSORT_DEADLINE\" ] || echo --all)")
+
+# Data shared by threads, with ThreadSanitizer: the slot, the clock, and a thousand model changes
+# while the audio thread plays. Only tests/run --deep builds it.
+if(NOT RESSORT_ADDRESS_SANITIZER AND NOT RESSORT_THREAD_SANITIZER)
+  # Loading and compiling use a single thread and are linked without the sanitizer, and so are the
+  # kernels. Whole folders are recompiled, because each folder is one object in the library.
+  get_target_property(ressort_shared_sources ressort_core SOURCES)
+  list(FILTER ressort_shared_sources INCLUDE REGEX "^core/(engine|kernels/domains)/")
+  get_target_property(ressort_shared_app ressort_app SOURCES)
+  list(FILTER ressort_shared_app INCLUDE REGEX "^app/(realtime/.*|session/.*|[^/]*)\\.cpp$")
+  list(APPEND ressort_shared_sources ${ressort_shared_app})
+  list(TRANSFORM ressort_shared_sources PREPEND ${CMAKE_SOURCE_DIR}/)
+  add_executable(ressort_race_tests EXCLUDE_FROM_ALL unit/realtime/lockfree_test.cpp unit/realtime/helpers_test.cpp
+    unit/session/session_test.cpp unit/session/timbre_watch_test.cpp
+    ${ressort_shared_sources})
+  ressort_compile_by_folder(ressort_race_tests)
+  target_compile_options(ressort_race_tests PRIVATE -O1 -fsanitize=thread -g1 -Wno-tsan
+    -Wno-maybe-uninitialized)  # GCC sees ghosts behind its own instrumentation
+  target_link_options(ressort_race_tests PRIVATE -fsanitize=thread)
+  target_precompile_headers(ressort_race_tests PRIVATE ${ressort_app_headers})
+  target_compile_definitions(ressort_race_tests PRIVATE RESSORT_SOURCE="${CMAKE_SOURCE_DIR}")
+  # The library comes after the instrumented objects, so that the linker prefers these.
+  target_link_libraries(ressort_race_tests PRIVATE ressort_test_main ressort_test_networks ressort_app
+    Threads::Threads)
+  add_dependencies(ressort_deep ressort_race_tests)
+  add_deep_test(races 60 ${CMAKE_COMMAND} -E env TSAN_OPTIONS=halt_on_error=1
+    $<TARGET_FILE:ressort_race_tests>)
+endif()

@@ -148,7 +148,7 @@ class Harness {
     }
     write(folder_ / "runner.cpp", "#define CHANNELS " + std::to_string(channels) + "\n" + runner +
                                       make + "  return nullptr;\n}\n" + runner_end);
-    run(std::string(RESSORT_CXX) + " -std=c++17 -O1 -ffp-contract=off -w " + path("runner.cpp") +
+    run(std::string(RESSORT_CXX) + " -std=c++17 -O0 -ffp-contract=off -w " + path("runner.cpp") +
         " -o " + path("runner"));
   }
   ~Harness() {

@@ -12,6 +12,7 @@ namespace {
 constexpr double lightest_dbfs = -96.0;
 constexpr double darkest_dbfs = -16.0;
 constexpr double level_floor_dbfs = -72.0;
+constexpr double level_step_db = 4.0;  // step between two shades of the figure of all presets
 
 // Percent-encodes a file name.
 std::string link_to(const std::string& file) {
@@ -221,8 +222,12 @@ plot::Figure gallery_figure(const std::vector<ShownPreset>& presets) {
   for (const ShownPreset& preset : presets) {
     if (preset.failure.empty()) {
       const Spectrogram& all = preset.spectrogram;
-      figure.panels.push_back(spectrogram_panel(
-          preset, downsampled(all, (all.rows + 1) / 2, all.columns / 2), {100.0, 1e3, 1e4}));
+      Spectrogram small = downsampled(all, (all.rows + 1) / 2, all.columns / 2);
+      // Few shades of grey keep the images in the figure small.
+      for (double& cell : small.dbfs) {
+        cell = level_step_db * std::round(cell / level_step_db);
+      }
+      figure.panels.push_back(spectrogram_panel(preset, small, {100.0, 1e3, 1e4}));
       figure.panels.back().title = preset.name;
     }
   }
