@@ -8,6 +8,11 @@ namespace ressort::command_line {
 namespace {
 
 const char* const examples =
+    "--statistical makes a body without a file: a soundboard, box or room whose modes have a "
+    "density,\n"
+    "a loss and random shapes. A bridge (in1) drives it, and left and right (out1, out2) hear "
+    "it.\n"
+    "Curves are straight between their points over the logarithm of the frequency.\n"
     "FILE is one of:\n"
     "- a recording of one object, struck once (.wav, .flac, .ogg, .aiff, ...). The body has its "
     "modes, the\n"
@@ -23,7 +28,9 @@ const char* const examples =
     "  ressort body bell.stl --material bronze --scale 0.001 --place rim=150,0,0 -o bell.mdl\n"
     "  ressort body bar.obj --young 11e9 --poisson 0.25 --density 750 --loss 0.01 -o bar.mdl\n"
     "  ressort body drum.mdl -o drum_body.mdl\n"
-    "  ressort body bell.mdl --chain rim -o chain.mdl\n";
+    "  ressort body bell.mdl --chain rim -o chain.mdl\n"
+    "  ressort body --statistical 300:0.03,5000:0.03 --loss 0.02 --mode 100,20 --mode 190,30 -o "
+    "box.mdl\n";
 
 void add_recording(CLI::App& command, BodyOptions& options) {
   command
@@ -31,9 +38,6 @@ void add_recording(CLI::App& command, BodyOptions& options) {
                   "omit modes whose energy is further below the strongest mode")
       ->type_name("DB")
       ->check(within(-200.0, 0.0))
-      ->capture_default_str();
-  command.add_option("-M,--mass", options.mass, "modal mass of every mode")
-      ->check(within(1e-9, 1e9))
       ->capture_default_str();
   command.add_flag("--json", options.as_json, "print JSON");
 }
@@ -46,14 +50,12 @@ void add_solid(CLI::App& command, SolidBodyOptions& options) {
   command.add_option("--young", options.young, "Young's modulus")->type_name("PA");
   command.add_option("--poisson", options.poisson, "Poisson's ratio");
   command.add_option("--density", options.density, "density in kg/m^3");
-  CLI::Option* loss =
-      command.add_option("--loss", options.loss, "loss factor: T60 = 2.2 / (LOSS * frequency)");
   command
       .add_option("--rayleigh", options.rayleigh,
                   "Rayleigh damping in 1/s and s: T60 = 13.8 / (A + B (2 pi frequency)^2)")
       ->type_name("A,B")
       ->delimiter(',')
-      ->excludes(loss);
+      ->excludes("--loss");
   command
       .add_option("--scale", options.scale, "metres per unit of the file; 0.001 for millimetres")
       ->check(within(1e-9, 1e9))
@@ -76,15 +78,60 @@ void add_solid(CLI::App& command, SolidBodyOptions& options) {
   command.add_flag("-q,--quiet", options.is_quiet, "print errors only");
 }
 
+// An option with a curve over frequency, or one value for all frequencies.
+CLI::Option* add_curve(CLI::App& command, const std::string& name, std::vector<CurvePoint>& target,
+                       double least, double most, const std::string& help) {
+  return command
+      .add_option_function<std::string>(
+          name,
+          [&target, name, least, most](const std::string& text) {
+            auto curve = parse_curve(text, least, most);
+            if (!curve) {
+              throw CLI::ValidationError(name, curve.error().message);
+            }
+            target = *std::move(curve);
+          },
+          help)
+      ->type_name("HZ:VALUE,...");
+}
+
+void add_statistics(CLI::App& command, BodyStatistics& statistics) {
+  CLI::Option* density =
+      add_curve(command, "--statistical", statistics.density, 1e-9, 1e3,
+                "density of the modes in modes/Hz, from the lowest to the highest frequency");
+  add_parsed(command, "--mode", statistics.given, parse_mode,
+             "known mode: HZ,Q[,BRIDGE[,LEFT[,RIGHT]]]; displacements relative to the rms of the "
+             "drawn modes (default 1; RIGHT as LEFT)")
+      ->needs(density);
+  add_curve(command, "--radiation", statistics.radiation, -200.0, 200.0,
+            "level of the outputs in dB over frequency")
+      ->needs(density);
+  command.add_option("--seed", statistics.seed, "equal numbers draw equal modes")
+      ->check(within(0.0, 1e9))
+      ->capture_default_str()
+      ->needs(density);
+}
+
+// Returns an option that a statistical body cannot use, or null. Help stays short without CLI11's
+// list of exclusions at each option.
+CLI::Option* unused_by_statistics(CLI::App& command) {
+  for (CLI::Option* option : command.get_options()) {
+    const std::string group = option->get_group();
+    if (option->count() > 0 && (group == "Recording" || group == "Solid" || group == "Model" ||
+                                option->check_name("FILE") || option->check_name("--picture"))) {
+      return option;
+    }
+  }
+  return nullptr;
+}
+
 }  // namespace
 
 void add_body(CLI::App& app, BodyRequest& request, int& code) {
-  CLI::App* command =
-      app.add_subcommand("body", "converts a recording, a 3D solid or a model into a modal body");
+  CLI::App* command = app.add_subcommand(
+      "body", "makes a modal body from a recording, a solid, a model or statistics");
   command->footer(examples);
-  command->add_option("FILE", request.input, "recording, solid or model")
-      ->type_name("PATH")
-      ->required();
+  command->add_option("FILE", request.input, "recording, solid or model")->type_name("PATH");
   add_output(*command, request.output, "model to write (default: print)");
   command
       ->add_option("--picture", request.picture,
@@ -94,6 +141,13 @@ void add_body(CLI::App& app, BodyRequest& request, int& code) {
       ->add_option("--modes", request.modes,
                    "largest number of modes (default: 400; 40 of a solid; all of a model)")
       ->check(within(1, 2000));
+  command
+      ->add_option("-M,--mass", request.mass,
+                   "mass of every mode of a recording; mass of a statistical body")
+      ->check(within(1e-9, 1e9))
+      ->capture_default_str();
+  add_curve(*command, "--loss", request.loss, 1e-9, 1.0,
+            "loss factor: T60 = 2.2 / (LOSS * frequency); a curve only for a statistical body");
   add_overwrite(*command, request.force);
   command->option_defaults()->group("Recording");
   add_recording(*command, request.recording);
@@ -102,7 +156,18 @@ void add_body(CLI::App& app, BodyRequest& request, int& code) {
   command->option_defaults()->group("Model");
   command->add_option("--chain", request.network.chain, "place whose response the chain has")
       ->type_name("PLACE");
-  command->callback([&request, &code] { code = body_command(request); });
+  command->option_defaults()->group("Statistics");
+  add_statistics(*command, request.statistical.statistics);
+  command->callback([command, &request, &code] {
+    const bool is_statistical = !request.statistical.statistics.density.empty();
+    if (!is_statistical && request.input.empty()) {
+      throw CLI::RequiredError("FILE or --statistical");
+    }
+    if (CLI::Option* unused = is_statistical ? unused_by_statistics(*command) : nullptr) {
+      throw CLI::ExcludesError(unused->get_name(), "--statistical");
+    }
+    code = body_command(request);
+  });
 }
 
 }  // namespace ressort::command_line

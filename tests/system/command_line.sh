@@ -69,6 +69,29 @@ expect 2 "ends in .svg" "$program" body blow.flac --picture rings.png
 expect 0 "rings.wav" "$program" render Marimba -s 0 -o rings.wav
 expect 2 "'rings.wav': " "$program" body rings.wav
 
+# Statistical bodies. The command in a model's head must write the model again.
+expect 0 "box.mdl: " "$program" body --statistical 350:0.03,6000:0.03 --loss 0.02 --mass 1.2 \
+  --mode 100,20,2,1 --mode 190,30,2.8,1 --mode 250,35,2,1,-1 -o box.mdl
+expect 0 "--mode 250,35,2,1,-1" cat box.mdl
+expect 0 "stable" "$program" check box.mdl
+expect 2 "box.mdl" "$program" body --statistical 100:0.05,900:0.01 --loss 0.02 -o box.mdl
+expect 2 "FILE or --statistical is required" "$program" body
+expect 2 "--floor excludes --statistical" "$program" body --statistical 9:1,90:1 --loss 1 --floor -9
+expect 2 "--seed requires --statistical" "$program" body blow.flac --seed 2
+expect 2 "at least two points HZ:DENSITY" "$program" body --statistical 0.05 --loss 0.02
+expect 2 "needs --loss" "$program" body --statistical 100:0.05,900:0.01
+expect 2 "900 modes, more than the limit of 400" "$program" body --statistical 100:1,1000:1 --loss 1
+expect 2 "ascending frequencies of 1 to 20000" "$program" body --statistical 900:1,100:1 --loss 1
+expect 2 "expected HZ,Q, HZ,Q,BRIDGE" "$program" body --statistical 9:1,90:1 --loss 1 --mode 275
+expect 2 "a solid has one loss factor" "$program" body box.obj --loss 100:0.1,900:0.2
+command=$(sed -n '/^# ressort body/,/[^\\]$/p' "$source/models/Soundboard.mdl" |
+  sed 's/^# *\(ressort\)\{0,1\}//; s/\\$//' | tr '\n' ' ')
+# shellcheck disable=SC2086
+expect 0 "Soundboard.mdl: 155 modes" "$program" $command
+sed -n '/^@/p' "$source/models/Soundboard.mdl" > expected.mdl
+sed -n '/^@/p' Soundboard.mdl > written.mdl
+expect 0 "same modes" sh -c "cmp expected.mdl written.mdl && echo same modes"
+
 # Descriptions.
 expect 0 ", the centroid of the spectrum" "$program" describe blow.flac -o timbre.svg
 expect 2 "timbre.svg' exists already" "$program" describe blow.flac -o timbre.svg

@@ -2,11 +2,21 @@
 
 #include <cstdio>
 
+#include "app/commands/output.h"
 #include "app/exit_code.h"
 
 namespace ressort::commands {
 
 int body_command(const BodyRequest& request) {
+  if (request.input.empty()) {
+    StatisticalBodyOptions options = request.statistical;
+    options.statistics.mass = request.mass;
+    options.statistics.loss = request.loss;
+    options.output = request.output;
+    options.force = request.force;
+    options.most_modes = request.modes.value_or(options.most_modes);
+    return statistical_body(options);
+  }
   const bool is_model = request.input.ends_with(".mdl") || request.input.ends_with(".toml");
   if (!is_model && !request.network.chain.empty()) {
     std::fprintf(
@@ -26,13 +36,20 @@ int body_command(const BodyRequest& request) {
     return network_body(options);
   }
   if (is_solid_file_name(request.input)) {
+    if (request.loss.size() > 1) {
+      return reject("--loss: a solid has one loss factor; give one number");
+    }
     SolidBodyOptions options = common(request.solid);
+    if (!request.loss.empty()) {
+      options.loss = request.loss.front()[1];
+    }
     options.picture = request.picture;
     options.modes = request.modes.value_or(options.modes);
     return solid_body(options);
   }
   BodyOptions options = common(request.recording);
   options.picture = request.picture;
+  options.mass = request.mass;
   options.most_modes =
       request.modes ? static_cast<std::size_t>(*request.modes) : options.most_modes;
   return recording_body(options);

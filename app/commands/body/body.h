@@ -1,12 +1,14 @@
-// app/commands: converts a recording, a solid or a model into a modal body. Functions return the
-// exit code.
+// app/commands: makes a modal body from a recording, a solid, a model or statistics. Functions
+// return the exit code.
 #pragma once
 
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "app/commands/body/solid.h"
+#include "app/commands/body/statistical.h"
 
 namespace ressort::commands {
 
@@ -31,19 +33,22 @@ struct NetworkBodyOptions {
   std::string chain;      // place whose response a chain gets; empty: no chain
 };
 
-// Options of the command line for all kinds of files.
+// Options of the command line for all kinds of bodies.
 struct BodyRequest {
   BodyOptions recording;
   SolidBodyOptions solid;
   NetworkBodyOptions network;
-  std::string input;
+  StatisticalBodyOptions statistical;
+  std::string input;  // empty: from statistics
   std::string output;
   std::string picture;
   bool force = false;
   std::optional<int> modes;
+  double mass = 40.0;
+  std::vector<CurvePoint> loss;  // loss factor; empty: that of the material
 };
 
-// Selects the kind of file by its extension. [main]
+// Selects the kind of body by the file's extension. [main]
 int body_command(const BodyRequest& request);
 
 // Convert a recording and a model. [main]

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "app/commands/body/numbers.h"
 #include "app/commands/body/shapes.h"
 #include "app/commands/output.h"
 #include "app/commands/progress_bar.h"
@@ -62,21 +63,6 @@ bool is_place_name(const std::string& name) {
          std::all_of(name.begin(), name.end(), [](char c) {
            return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
          });
-}
-
-// Parses N numbers, separated by commas.
-std::optional<std::vector<double>> numbers_of(const std::string& text) {
-  std::vector<double> numbers;
-  for (std::size_t from = 0; from <= text.size();) {
-    const std::size_t end = std::min(text.find(',', from), text.size());
-    double number = 0.0;
-    if (!parse_number(text.substr(from, end - from), number)) {
-      return std::nullopt;
-    }
-    numbers.push_back(number);
-    from = end + 1;
-  }
-  return numbers;
 }
 
 std::string digits(double number, int significant) {
