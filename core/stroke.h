@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <vector>
 
 namespace ressort {
 
@@ -18,7 +19,37 @@ struct GestureSettings {
   double high_db = 0.0;
   double longest_s = 0.0;  // impulse, swing: duration of the softest pulse; 0: one sample
   double shortest_s = 0.0;
+  bool follows_pitch = true;  // speeds, forces and durations scale with the key's pitch
 };
+
+// The settings of a control at one key.
+struct KeySettings {
+  double key = 0.0;
+  GestureSettings settings;
+};
+
+// Returns the settings on a key, joined by straight lines. There is at least one row, and the keys
+// ascend. [any thread] wait-free, O(rows)
+inline GestureSettings settings_at(const std::vector<KeySettings>& rows, double key) {
+  std::size_t next = 0;
+  while (next < rows.size() && rows[next].key < key) {
+    ++next;
+  }
+  if (next == 0 || next == rows.size()) {
+    return rows[std::min(next, rows.size() - 1)].settings;
+  }
+  const KeySettings& a = rows[next - 1];
+  const KeySettings& b = rows[next];
+  const double way = (key - a.key) / (b.key - a.key);
+  GestureSettings settings = a.settings;
+  for (double GestureSettings::*const number :
+       {&GestureSettings::low, &GestureSettings::high, &GestureSettings::travel,
+        &GestureSettings::low_db, &GestureSettings::high_db, &GestureSettings::longest_s,
+        &GestureSettings::shortest_s}) {
+    settings.*number = std::lerp(a.settings.*number, b.settings.*number, way);
+  }
+  return settings;
+}
 
 struct Stroke {
   double amount = 1.0;  // 0..1 of a preset's source, or the first argument of a live call
@@ -31,7 +62,7 @@ struct Stroke {
   double middle = 0.0;      // position of the input in the model; 0 for a force
   double rate_ratio = 1.0;  // 44 100 Hz to the engine's rate
   double rate_hz = 44100.0;
-  double pitch = 1.0;  // ratio of the voice's pitch to the written pitch
+  double pitch = 1.0;  // the voice's pitch by the written pitch; 1 unless the control follows it
   bool bare = false;   // nothing is smoothed
   // Results, set by the gesture.
   std::optional<double> rest;      // position at which drivers of new voices start from now on
@@ -55,8 +86,9 @@ struct Stroke {
     const double db = settings.low_db + (settings.high_db - settings.low_db) * part;
     return std::pow(10.0, db / 20.0) * loudness.value_or(1.0);
   }
-  // Returns the duration of a blow. It shrinks in equal ratios from soft to hard, and in proportion
-  // to the period of a higher key, so that all keys have the same timbre.
+  // Returns the duration of a blow. It shrinks in equal ratios from soft to hard. If the control
+  // follows the pitch, it also shrinks in proportion to the period of a higher key, so that all
+  // keys have the same timbre.
   double pulse_frames() const {
     const double longest_s = settings.longest_s;
     const double shortest_s = settings.shortest_s;

@@ -153,6 +153,10 @@ json scene_json(const Scene& scene, const Compiled& compiled, const Proved& prov
   for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
     parameters.push_back(parameter_json(instrument.parameters[i],
                                         scene.network.parameters[i].audio_input, proved.safe[i]));
+    const std::string curve = curve_text(scene.preset, instrument.parameters[i].name);
+    if (!curve.empty()) {
+      parameters.back()["curve"] = curve;
+    }
   }
   json plan = json::array();
   for (const Part& part : compiled.plan.parts) {
@@ -259,8 +263,10 @@ void print_report(const Scene& scene, const Compiled& compiled, const Proved& pr
       std::printf("  %-12s audio input %d, from %g to %g; %s\n", info.name.c_str(), input,
                   info.minimum, info.maximum, safe.c_str());
     } else {
-      std::printf("  %-12s %-10g from %g to %g; %s\n", info.name.c_str(), info.value, info.minimum,
-                  info.maximum, safe.c_str());
+      const std::string curve = curve_text(scene.preset, info.name);
+      std::printf("  %-12s %-10g from %g to %g; %s%s%s\n", info.name.c_str(), info.value,
+                  info.minimum, info.maximum, safe.c_str(), curve.empty() ? "" : "; ",
+                  curve.c_str());
     }
   }
   std::printf("methods:\n  %s", describe(compiled.plan).c_str());

@@ -242,10 +242,11 @@ Result<Done> command::params(ConsoleContext& console, Words) {
   const bool is_proved = current->instrument.verdict == Verdict::stable;
   std::vector<std::vector<std::string>> rows;
   for (const ParameterInfo& info : current->instrument.parameters) {
+    const std::string curve = curve_text(current->preset, info.name);
     rows.push_back({info.name,
                     print_number(console.session.parameter(info.name).value_or(info.value)),
                     print_number(info.minimum) + " .. " + print_number(info.maximum),
-                    is_proved ? describe(info.safe) : ""});
+                    (is_proved ? describe(info.safe) : "") + (curve.empty() ? "" : "; ") + curve});
   }
   console.print(rows.empty() ? current->name + " has no parameters" : table(rows));
   return Done{};
@@ -373,7 +374,8 @@ std::vector<std::vector<std::string>> control_rows(const ConsoleContext& console
       continue;
     }
     const bool turns = control.gesture == Gesture::parameter;
-    const std::string range = print_number(control.low) + " to " + print_number(control.high);
+    const std::string range = print_number(control.low) + " to " + print_number(control.high) +
+                              (control.range_keys.empty() ? "" : " on middle C, by key");
     const bool has_all_keys = control.lowest_key == 0 && control.highest_key == 127;
     const std::string keys = has_all_keys ? ""
                                           : ", keys " + std::to_string(control.lowest_key) +

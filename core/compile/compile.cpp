@@ -195,7 +195,8 @@ Result<Compiled> compile_by_stages(const CompileRequest& request) {
 
   const Proof proof = prove(request, reduced, *analysis, schemes, machine);
   Planned planned = plan(request, *analysis, proof, std::move(machine));
-  const TunedKeys keys = tune(request, network, *analysis, proof.margins, planned);
+  const TunedKeys keys = tune(request, network, *analysis, proof.margins, planned,
+                              voice_curves(network, preset, proof.stability));
 
   if (auto error = check_memory(planned.machine, request.voices, options.precision,
                                 options.executor, options.most_bytes)) {

@@ -13,6 +13,19 @@
 namespace ressort::compile {
 namespace {
 
+GestureSettings settings_of(const ControlSetting& setting) {
+  return {.low = setting.low,
+          .high = setting.high,
+          .exponential = setting.exponential,
+          .travel = setting.travel,
+          .has_level = setting.has_level,
+          .low_db = setting.low_db,
+          .high_db = setting.high_db,
+          .longest_s = setting.longest_ms / 1e3,
+          .shortest_s = setting.shortest_ms / 1e3,
+          .follows_pitch = setting.follows_pitch};
+}
+
 // The setting must fit the network.
 Control make_control(const Network& network, const ControlSetting& setting) {
   static constexpr Source sources[] = {Source::note, Source::controller, Source::pressure,
@@ -26,15 +39,10 @@ Control make_control(const Network& network, const ControlSetting& setting) {
   control.highest_key = static_cast<std::uint8_t>(setting.highest_key);
   control.turn = static_cast<std::uint8_t>(setting.turn - 1);
   control.turns = static_cast<std::uint8_t>(setting.turns);
-  control.settings = {.low = setting.low,
-                      .high = setting.high,
-                      .exponential = setting.exponential,
-                      .travel = setting.travel,
-                      .has_level = setting.has_level,
-                      .low_db = setting.low_db,
-                      .high_db = setting.high_db,
-                      .longest_s = setting.longest_ms / 1e3,
-                      .shortest_s = setting.shortest_ms / 1e3};
+  control.settings = settings_of(setting);
+  for (const double key : curve_keys(setting)) {
+    control.by_key.push_back({key, settings_of(on_key(setting, key))});
+  }
   control.target = static_cast<std::uint16_t>(control.gesture == Gesture::parameter
                                                   ? find_parameter(network, setting.target)
                                                   : find_input(network, setting.target));
@@ -219,13 +227,41 @@ Preset in_positions(Preset preset, const Network& network, double swing) {
   return preset;
 }
 
+std::vector<std::optional<VoiceCurve>> voice_curves(const Network& network, const Preset& preset,
+                                                    const StabilityCheck& stability) {
+  std::vector<std::optional<VoiceCurve>> curves;
+  for (const ParameterSetting& setting : preset.parameters) {
+    const int found = setting.has_curve() ? find_parameter(network, setting.name) : -1;
+    if (found >= 0) {
+      const auto index = static_cast<std::size_t>(found);
+      const ParameterInfo& info = stability.parameters[index];
+      curves.resize(network.parameters.size());
+      curves[index] = {.keys = setting.keys,
+                       .velocity = setting.velocity,
+                       .keys_at = setting.keys_at.value_or(setting.value),
+                       .lowest = info.minimum,
+                       .highest = info.maximum};
+    }
+  }
+  return curves;
+}
+
 Playing make_playing(const Network& network, const Preset& preset, const Proof& proof,
                      const TunedKeys& keys, bool bare, int voices, double gain) {
+  const auto curves = voice_curves(network, preset, proof.stability);
+  // The range of a curve bounds its knob, too, so that no voice leaves the proved box.
+  std::vector<Limits> limits = proof.stability.limits;
+  for (std::size_t i = 0; i < curves.size(); ++i) {
+    if (curves[i]) {
+      limits[i] = {curves[i]->lowest, curves[i]->highest};
+    }
+  }
   return {
       .voices = voices,
       .gain = gain,
       .bare = bare,
       .damper_s = preset.damper_s,
+      .damper_keys = preset.damper_keys,
       .decay_s = preset.decay_s,
       .keys_db = preset.keys_db,
       .noise = preset.noise,
@@ -238,12 +274,14 @@ Playing make_playing(const Network& network, const Preset& preset, const Proof& 
       .legato = preset.legato,
       .glide_s = preset.glide_s,
       .pitches = keys.pitches,
+      .key_pitches = keys.by_key,
       .along = keys.along,
       .highest_factor = keys.highest_factor,
       .home = proof.margins.home,
       .away = keys.away,
       .controls = make_controls(network, preset),
-      .limits = proof.stability.limits,
+      .limits = std::move(limits),
+      .curves = curves,
       .rest_bounds = proof.rest_bounds};
 }
 

@@ -73,6 +73,11 @@ Preset without_swings(Preset preset);
 // Returns the preset with these ranges as positions. `swing`: peak displacement of a loud note.
 Preset in_positions(Preset preset, const Network& network, double swing);
 
+// Returns the curves of the parameters whose values differ from voice to voice, [parameter], within
+// the proved ranges. Empty if there are none. [any thread but audio]
+std::vector<std::optional<VoiceCurve>> voice_curves(const Network& network, const Preset& preset,
+                                                    const StabilityCheck& stability);
+
 // Collects the results of the stages for the engine. O(inputs * links). [any thread but audio]
 Playing make_playing(const Network& network, const Preset& preset, const Proof& proof,
                      const TunedKeys& keys, bool bare, int voices, double gain);

@@ -52,14 +52,16 @@ Pitches sharpened(const Pitches& pitches, const Preset& preset) {
 }
 
 // Returns the parameter along which keys stay in tune and its range, without pitches.
-std::optional<PitchesAlong> range_to_tune(const CompileRequest& request, const Network& network) {
+std::optional<PitchesAlong> range_to_tune(const CompileRequest& request, const Network& network,
+                                          std::span<const double> start) {
   const Preset& preset = request.preset;
   const std::string& name = preset.morph.empty() ? preset.tuned_along : preset.morph_parameter;
   const int parameter = find_parameter(network, name);
   if (parameter < 0 || request.options.bare) {
     return std::nullopt;
   }
-  PitchesAlong along{.parameter = static_cast<std::size_t>(parameter)};
+  PitchesAlong along{.parameter = static_cast<std::size_t>(parameter),
+                     .start = start[static_cast<std::size_t>(parameter)]};
   for (const ParameterSetting& setting : preset.parameters) {
     if (setting.name == name && preset.morph.empty()) {
       along.lowest = setting.minimum;
@@ -80,7 +82,7 @@ PitchesAlong find_pitches_along(const CompileRequest& request, const Network& ne
                                 const Machine& machine) {
   constexpr double in_tune = 1e-5;  // difference of the logarithm of the factor: 0.01 cents
   constexpr std::size_t most_steps = 64;
-  std::optional<PitchesAlong> along = range_to_tune(request, network);
+  std::optional<PitchesAlong> along = range_to_tune(request, network, machine.parameters);
   if (!along) {
     return {};
   }
@@ -120,10 +122,45 @@ PitchesAlong find_pitches_along(const CompileRequest& request, const Network& ne
   return is_found ? *std::move(along) : PitchesAlong();
 }
 
+// Tunes each key at its own values of the parameters. Empty if the curves change no parameter from
+// key to key, or if a mode is missing on any key.
+std::vector<Pitches> find_key_pitches(const CompileRequest& request, const Network& network,
+                                      const Machine& machine,
+                                      const std::vector<std::optional<VoiceCurve>>& curves) {
+  if (std::none_of(curves.begin(), curves.end(),
+                   [](const auto& curve) { return curve && !curve->keys.empty(); })) {
+    return {};
+  }
+  request.options.progress.stage("tuning each key at its own parameters");
+  std::vector<Pitches> keys;
+  std::vector<double> before;
+  for (std::size_t key = 0; key < key_count; ++key) {
+    std::vector<double> parameters = machine.parameters;
+    for (std::size_t i = 0; i < curves.size(); ++i) {
+      if (curves[i]) {
+        parameters[i] = curves[i]->on_key(static_cast<double>(key), parameters[i]);
+      }
+    }
+    if (parameters == before) {
+      keys.push_back(keys.back());
+      continue;
+    }
+    const auto shapes = find_shapes(request, network, parameters);
+    if (!shapes) {
+      return {};
+    }
+    keys.push_back(sharpened(find_pitches(request, network, machine, *shapes, parameters).pitches,
+                             request.preset));
+    before = std::move(parameters);
+  }
+  return keys;
+}
+
 }  // namespace
 
 TunedKeys tune(const CompileRequest& request, const Network& network, const Analysis& analysis,
-               const Margins& margins, const Planned& planned) {
+               const Margins& margins, const Planned& planned,
+               const std::vector<std::optional<VoiceCurve>>& curves) {
   TunedKeys keys{.highest_factor = margins.keys, .away = margins.away};
   if (!analysis.shapes) {
     return keys;
@@ -138,6 +175,7 @@ TunedKeys tune(const CompileRequest& request, const Network& network, const Anal
   keys.mode = analysis.mode();
   keys.mode->frequency_hz = keys.pitches.frequency_at(1.0);
   keys.along = find_pitches_along(request, network, planned.machine);
+  keys.by_key = find_key_pitches(request, network, planned.machine, curves);
   // The chosen forms allow more stiffness than the published scheme. Keys may use it up to the
   // highest mode that is played.
   if (planned.more > 1.0) {

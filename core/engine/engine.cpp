@@ -57,7 +57,7 @@ struct Engine::Player {
                                                        voices.size(), isa, executor, progress)
                                              : AnyBank(std::in_place_type<Bank<double>>, machine,
                                                        voices.size(), isa, executor, progress)),
-        parameters(machine, playing),
+        parameters(machine, playing, voices.size()),
         gestures(machine, playing),
         audio(machine, playing, std::visit([](const auto& b) { return b.mixer.is_silent; }, bank)),
         watch(machine, playing, voices.size()),
@@ -156,6 +156,7 @@ struct Engine::Player {
 
   // Plays the note controls of the latest voice.
   void strike_note(int key, double velocity) {
+    keyboard.set_velocity(voices[voices.latest()], velocity);
     play_controls(Source::note, key, velocity,
                   {.channels = channel_bit(voices[voices.latest()].channel)});
   }

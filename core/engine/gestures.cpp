@@ -18,8 +18,12 @@ bool matches(const Control& control, Source source, int number) {
                                                                      : true);
 }
 
-Stroke stroke_of(const Control& control, double amount = 1.0) {
-  return {.amount = amount, .has_control = true, .settings = control.settings};
+Stroke stroke_of(const Control& control, double amount = 1.0, double key = middle_c) {
+  return {.amount = amount, .has_control = true, .settings = control.settings_on(key)};
+}
+
+double key_of(const Voice& voice) {
+  return voice.has_key ? voice.key : middle_c;
 }
 
 }  // namespace
@@ -28,12 +32,16 @@ Gestures::Gestures(const Machine& machine, const Playing& playing)
     : machine_(machine),
       playing_(playing),
       drivers_(lane_count(playing.voices) * machine.inputs.size()),
-      pitches_(lane_count(playing.voices), 1.0) {
+      pitches_(lane_count(playing.voices), 1.0),
+      keeps_speed_(machine.inputs.size()) {
   starts_.resize(Channels::count * machine.inputs.size());
   for (std::size_t input = 0; input < machine.inputs.size(); ++input) {
     set_starts(all_channels, input, machine.inputs[input].position);
   }
   for (const Control& control : playing.controls) {
+    if (control.gesture != Gesture::parameter && !control.settings.follows_pitch) {
+      keeps_speed_[control.target] = true;
+    }
     if (const auto start = row_of(control.gesture).start) {
       set_starts(all_channels, control.target,
                  start(stroke_on(control.target, stroke_of(control))));
@@ -52,6 +60,19 @@ void Gestures::reset_drivers(const Voice& voice, std::size_t lane) {
   const std::size_t inputs = machine_.inputs.size();
   for (std::size_t input = 0; input < inputs; ++input) {
     driver(lane, input).place(starts_[voice.channel * inputs + input]);
+  }
+  // The rest position of these gestures depends on the key. A pluck starts on the side where the
+  // last one ended.
+  for (const Control& control : playing_.controls) {
+    const GestureRow& gesture = row_of(control.gesture);
+    if (!control.by_key.empty() && gesture.start != nullptr && gesture.goal == nullptr &&
+        voice.has_key && matches(control, Source::note, voice.key)) {
+      const double middle = machine_.inputs[control.target].position;
+      const double last = starts_[voice.channel * inputs + control.target] - middle;
+      const double start =
+          gesture.start(stroke_on(control.target, stroke_of(control, 1.0, voice.key))) - middle;
+      driver(lane, control.target).place(middle + (last * start < 0.0 ? -start : start));
+    }
   }
 }
 
@@ -110,7 +131,7 @@ void Gestures::play(const GestureRow& gesture, std::size_t input, Stroke stroke,
   wake(keyboard, *latest, first_channel);
   Voice& voice = keyboard.voices[*latest];
   set_pitch(*latest, std::sqrt(keyboard.factor_of(voice, parameters.highest_factor())));
-  stroke.pitch = pitches_[*latest];
+  stroke.pitch = stroke.settings.follows_pitch ? pitches_[*latest] : 1.0;
   gesture.play(driver(*latest, input), stroke);
   if (stroke.settings.has_level && stroke.amount != 0.0) {
     keyboard.set_strength(voice, stroke.level());
@@ -124,8 +145,8 @@ void Gestures::play(const GestureRow& gesture, std::size_t input, Stroke stroke,
 }
 
 void Gestures::play(const Control& control, double amount, const Scope& scope, Keyboard& keyboard,
-                    Parameters& parameters) {
-  const Stroke stroke = stroke_of(control, amount);
+                    Parameters& parameters, double key) {
+  const Stroke stroke = stroke_of(control, amount, key);
   if (control.gesture == Gesture::parameter) {
     return parameters.set(control.target, stroke.mapped());
   }
@@ -136,7 +157,8 @@ void Gestures::play(Source source, int number, double amount, const Scope& scope
                     Keyboard& keyboard, Parameters& parameters) {
   for (const Control& control : playing_.controls) {
     if (matches(control, source, number) && has_turn(control, strokes_)) {
-      play(control, amount, scope, keyboard, parameters);
+      play(control, amount, scope, keyboard, parameters,
+           source == Source::note ? number : middle_c);
     }
   }
   strokes_ += source == Source::note ? 1 : 0;
@@ -151,10 +173,10 @@ void Gestures::follow_other_engine(int key, double amount, std::uint8_t channel,
     }
     const GestureRow& gesture = row_of(control.gesture);
     if (control.gesture == Gesture::parameter || gesture.goal != nullptr) {
-      play(control, amount, scope, keyboard, parameters);
+      play(control, amount, scope, keyboard, parameters, key);
       continue;
     }
-    Stroke stroke = stroke_on(control.target, stroke_of(control, amount));
+    Stroke stroke = stroke_on(control.target, stroke_of(control, amount, key));
     InputDriver silent;
     silent.place(starts_[channel * machine_.inputs.size() + control.target]);
     gesture.play(silent, stroke);
@@ -179,7 +201,9 @@ void Gestures::play_live(const Event& event, Keyboard& keyboard, Parameters& par
       return row.gesture == event.gesture && machine_.inputs[row.target].number == event.index;
     });
     if (control != controls.end()) {
-      play_on(control->target, stroke_of(*control));
+      const std::optional<std::size_t> latest = keyboard.latest_of(Scope{});
+      play_on(control->target,
+              stroke_of(*control, 1.0, latest ? key_of(keyboard.voices[*latest]) : middle_c));
     }
   } else if (gesture.live != Live::never) {
     for (std::size_t i = 0; i < machine_.inputs.size(); ++i) {
@@ -195,14 +219,17 @@ void Gestures::release(const Voice& voice, std::size_t lane) {
   for (const Control& control : playing_.controls) {
     const auto release = row_of(control.gesture).release;
     if (release != nullptr && matches(control, Source::note, voice.key)) {
-      release(driver(lane, control.target), stroke_on(control.target, stroke_of(control)));
+      release(driver(lane, control.target),
+              stroke_on(control.target, stroke_of(control, 1.0, voice.key)));
     }
   }
 }
 
 void Gestures::set_pitch(std::size_t lane, double pitch) {
   for (std::size_t input = 0; input < machine_.inputs.size(); ++input) {
-    driver(lane, input).scale_speed(pitch / pitches_[lane]);
+    if (!keeps_speed_[input]) {
+      driver(lane, input).scale_speed(pitch / pitches_[lane]);
+    }
   }
   pitches_[lane] = pitch;
 }

@@ -43,7 +43,7 @@ class Gestures {
   void play(Source source, int number, double amount, const Scope& scope, Keyboard& keyboard,
             Parameters& parameters);
   void play(const Control& control, double amount, const Scope& scope, Keyboard& keyboard,
-            Parameters& parameters);
+            Parameters& parameters, double key = middle_c);
   // Follows a note that another engine plays (NoteShare). Gestures that move all voices are played;
   // of the others only the position is kept at which the next one starts.
   void follow_other_engine(int key, double amount, std::uint8_t channel, Keyboard& keyboard,
@@ -91,6 +91,7 @@ class Gestures {
   const Playing& playing_;
   std::vector<InputDriver> drivers_;  // [lane][input]
   std::vector<double> pitches_;  // [lane] ratio to the written pitch, for which bow speeds are set
+  std::vector<bool> keeps_speed_;  // [input] bows there do not follow the pitch
   std::vector<double> starts_;   // [channel][input] initial position of a new voice's driver
   std::uint64_t strokes_ = 0;    // notes played so far, for round robins
 };

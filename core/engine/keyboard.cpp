@@ -84,7 +84,7 @@ Press Keyboard::press_key(int key, double velocity, std::uint8_t channel, double
   // Fixed tuning has one instrument and one voice; a key only excites it.
   const bool is_fixed = playing_.tuning == Tuning::fixed;
   const double note_hz = is_fixed ? 0.0 : tuning_.note_hz(key, own_hz);
-  const double hz = is_fixed ? 0.0 : tuning_.playable_hz(note_hz, highest_factor);
+  const double hz = is_fixed ? 0.0 : tuning_.playable_hz(key, note_hz, highest_factor);
   if (!is_fixed && hz == 0.0) {
     return Press::silent;
   }
@@ -138,6 +138,9 @@ Press Keyboard::press_key(int key, double velocity, std::uint8_t channel, double
 void Keyboard::attach(Voice& voice, int key, std::uint8_t channel) {
   voice.has_key = true;
   voice.key = static_cast<std::uint8_t>(key);
+  if (!playing_.curves.empty()) {
+    voices.mark_retuned(voice);
+  }
   voice.channel = channel;
   voice.turn = ++turns_;
   voice.held = true;
@@ -198,7 +201,8 @@ bool Keyboard::release_key(Voice& voice, int key, std::uint8_t channel, double v
   voice.held = false;
   voice.is_released = true;
   voice.release_s =
-      playing_.damper_s * std::pow(release_range, 2.0 * (usual_release_velocity - velocity));
+      playing_.damper_on(voice.key) *
+      std::pow(release_range, 2.0 * (usual_release_velocity - velocity));
   voice.sustained = voice.latched || channels_.sustains(channel);
   damp(voice);
   return !voice.sustained;
@@ -224,7 +228,8 @@ void Keyboard::damp_keyless(Voice& voice) const {
 
 // Sets the damper by the voice's key and pedals.
 void Keyboard::damp(Voice& voice) const {
-  const bool may_lie = voice.is_released && !voice.latched && playing_.damper_s > 0.0;
+  const double damper_s = playing_.damper_on(voice.has_key ? voice.key : middle_c);
+  const bool may_lie = voice.is_released && !voice.latched && damper_s > 0.0;
   const double share = voice.is_replaced ? 1.0 : may_lie ? channels_.damper(voice.channel) : 0.0;
   const bool has_decay = voice.has_key && !playing_.decay_s.empty();
   voices.damp(voice, share, has_decay ? 1.0 / value_at(playing_.decay_s, voice.key) : 0.0);
@@ -327,6 +332,14 @@ SideGains Keyboard::level_of(const Voice& voice) const {
   return {level * balance[0], level * balance[1]};
 }
 
+void Keyboard::set_velocity(Voice& voice, double velocity) {
+  constexpr double highest = 127.0;
+  voice.velocity = highest * velocity;
+  if (!playing_.curves.empty()) {
+    voices.mark_retuned(voice);
+  }
+}
+
 void Keyboard::set_strength(Voice& voice, double strength) const {
   voice.strength = strength;
   const SideGains level = level_of(voice);
@@ -376,7 +389,7 @@ std::optional<std::size_t> Keyboard::latest_of(const Scope& scope) const {
 // Moves a sounding voice to another pitch.
 void Keyboard::move_to(Voice& voice, int key, double own_hz, bool glides, double highest_factor) {
   const double key_hz = tuning_.note_hz(key, own_hz);
-  const double hz = tuning_.playable_hz(key_hz, highest_factor);
+  const double hz = tuning_.playable_hz(key, key_hz, highest_factor);
   voice.has_own_pitch = own_hz > 0.0;
   if (key_hz == voice.key_hz || hz == 0.0) {
     return;

@@ -106,6 +106,8 @@ class Keyboard {
     return playing_.legato || channels_.is_legato(channel);
   }
   const Channels& channels() const { return channels_; }
+  // Sets the velocity of a voice's strike, 0..1, for the curves of its parameters.
+  void set_velocity(Voice& voice, double velocity);
   // Sets a voice's gain by velocity: at once if it starts, else within 20 ms.
   void set_strength(Voice& voice, double strength) const;
 

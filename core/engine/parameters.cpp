@@ -14,11 +14,14 @@ constexpr double turn_s = 0.02;
 
 }  // namespace
 
-Parameters::Parameters(const Machine& machine, const Playing& playing)
+Parameters::Parameters(const Machine& machine, const Playing& playing, std::size_t lanes)
     : playing_(playing),
       turn_frames_(static_cast<std::size_t>(std::lround(turn_s * machine.rate_hz))),
       values_(machine.parameters),
       is_turned_(values_.size()) {
+  for (std::size_t lane = 0; !playing.curves.empty() && lane < lanes; ++lane) {
+    voice_values_.insert(voice_values_.end(), values_.begin(), values_.end());
+  }
   turned_.reserve(values_.size());
   changes_.reserve(max_parameter_changes);
   taken_.reserve(max_parameter_changes);
@@ -26,6 +29,9 @@ Parameters::Parameters(const Machine& machine, const Playing& playing)
 
 void Parameters::continue_from(const Parameters& from) {
   values_ = from.values_;
+  if (voice_values_.size() == from.voice_values_.size()) {
+    voice_values_ = from.voice_values_;
+  }
   changes_ = from.changes_;
   beyond_ = from.beyond_;
 }
@@ -87,8 +93,18 @@ std::span<const std::uint16_t> Parameters::take_changes() {
   return taken_;
 }
 
+void Parameters::update_voice_values(const Voices& voices) {
+  for (std::size_t lane = 0; !voice_values_.empty() && lane < voices.size(); ++lane) {
+    const Voice& voice = voices[lane];
+    for (std::size_t i = 0; voice.awake && i < values_.size(); ++i) {
+      voice_values_[lane * values_.size() + i] = value_in_voice(playing_, i, values_[i], voice);
+    }
+  }
+}
+
 template <class T>
 void Parameters::apply(Bank<T>& bank, const Voices& voices, EnergyWatch& watch) {
+  update_voice_values(voices);
   bank.each_group([&](PartBank<T>& part, const VoiceGroup& group) {
     const auto& depending = part.program.depending;
     const bool has_turned = std::any_of(turned_.begin(), turned_.end(), [&](std::uint16_t index) {
@@ -110,7 +126,8 @@ void Parameters::apply(Bank<T>& bank, const Voices& voices, EnergyWatch& watch) 
       const bool ramped = !voice.is_new && !playing_.bare;
       const auto set = [&](std::uint32_t c) {
         const double value =
-            coefficient_value(part.program, part.program.coefficients[c], values_, voice.factor);
+            coefficient_value(part.program, part.program.coefficients[c], values_in(lane),
+                              voice.factor);
         kernel.coefficients.set(lane - group.first, c, value, ramped);
       };
       for (std::uint32_t c = 0; is_tuned && c < part.program.coefficients.size(); ++c) {
@@ -150,12 +167,16 @@ void Parameters::fill_audio(Bank<T>& bank, const VoiceGroup& group, const Segmen
       const double wanted = is_there ? segment.inputs[channel][n] : 0.0;
       values_[audio.parameter] = within_limits(audio.parameter, wanted);
       is_beyond |= values_[audio.parameter] != wanted;
+      for (std::size_t lane = group.first; !voice_values_.empty() && lane < group.end; ++lane) {
+        voice_values_[lane * values_.size() + audio.parameter] = values_[audio.parameter];
+      }
     }
     for (const std::uint32_t c : program.audio_coefficients) {
       for (std::size_t lane = group.first; lane < group.first + part.width; ++lane) {
-        const double factor = lane < group.end ? voices[lane].factor : 1.0;
-        *value++ =
-            static_cast<T>(coefficient_value(program, program.coefficients[c], values_, factor));
+        const bool is_voice = lane < group.end;
+        *value++ = static_cast<T>(coefficient_value(program, program.coefficients[c],
+                                                    is_voice ? values_in(lane) : values_,
+                                                    is_voice ? voices[lane].factor : 1.0));
       }
     }
   }

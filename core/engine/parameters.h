@@ -17,7 +17,7 @@ namespace ressort::engine {
 class Parameters {
  public:
   // Playing must have `limits` and `home` for every parameter.
-  Parameters(const Machine& machine, const Playing& playing);
+  Parameters(const Machine& machine, const Playing& playing, std::size_t lanes);
   void continue_from(const Parameters& from);
 
   std::span<const double> values() const { return values_; }
@@ -45,10 +45,18 @@ class Parameters {
 
  private:
   double within_limits(std::size_t index, double value) const;
+  // Returns the values in one voice. They differ from values() if the preset has curves.
+  std::span<const double> values_in(std::size_t lane) const {
+    return voice_values_.empty() ? std::span(values_)
+                                 : std::span(voice_values_)
+                                       .subspan(lane * values_.size(), values_.size());
+  }
+  void update_voice_values(const Voices& voices);
 
   const Playing& playing_;
   std::size_t turn_frames_;  // ramp of a changed parameter
   std::vector<double> values_;
+  std::vector<double> voice_values_;    // [lane][parameter]; empty: all voices have values_
   std::vector<std::uint16_t> turned_;   // since the last apply()
   std::vector<bool> is_turned_;         // [parameter]
   double highest_before_ = 1.0;         // highest_factor() before the first of these changes

@@ -45,6 +45,7 @@ struct PitchesAlong {
   double value_at(std::size_t index) const;
 
   std::size_t parameter = 0;
+  double start = 1.0;  // the parameter's value at the start
   double lowest = 1.0;
   double highest = 2.0;
   bool by_ratios = false;

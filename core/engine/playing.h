@@ -29,7 +29,13 @@ struct Control {
   std::uint8_t turns = 1;  // number of controls in the round robin
   Gesture gesture = Gesture::position;
   std::uint16_t target = 0;  // index into Machine::inputs or Machine::parameters
-  GestureSettings settings;
+  GestureSettings settings;        // for a sound without a key, those of middle C
+  std::vector<KeySettings> by_key;  // the settings at some keys, ascending; empty: on all keys alike
+
+  // [audio] wait-free, O(keys)
+  GestureSettings settings_on(double key) const {
+    return by_key.empty() ? settings : settings_at(by_key, key);
+  }
 };
 
 enum class Tuning : std::uint8_t {
@@ -76,6 +82,7 @@ struct Playing {
   double gain = 1.0;                // output per unit of position
   bool bare = false;                // the network alone: no ramps, no smoothing, no sleep
   double damper_s = 0.0;            // T60 of a released voice; 0: it rings freely
+  std::vector<CurvePoint> damper_keys;  // the same by key; replaces `damper_s`
   std::vector<CurvePoint> decay_s;  // T60 by key, on top of the model's decay; empty: none
   std::vector<CurvePoint> keys_db;  // gain by key; empty: 0 dB
   bool noise = false;               // the outputs modulate white noise
@@ -89,14 +96,25 @@ struct Playing {
   double glide_s = 0.0;                  // portamento time, linear in cents
   NoteShare::Part share;                 // the notes that this engine plays, of several engines
   Pitches pitches;                       // pitches of the lowest mode
+  std::vector<Pitches> key_pitches;      // [key] the same with the key's own parameters; may be empty
   PitchesAlong along;           // replaces `pitches` where a parameter must leave keys in tune
   double highest_factor = 1.0;  // greatest stiffness factor that is proved stable
   std::vector<Limits> home;     // [parameter] range in which highest_factor holds; empty: anywhere
   std::vector<double> away;     // highest_factor at equal steps from `home` to `limits`
   std::vector<Control> controls;
   std::vector<Limits> limits;  // [parameter] hard limits for events and audio; empty: none
+  // [parameter] the curve of a parameter whose value differs from voice to voice; empty: none does
+  std::vector<std::optional<VoiceCurve>> curves;
   std::vector<std::optional<RestBound>> rest_bounds;  // [part]; nullopt or missing: never frozen
 
+  // Returns the T60 of a released voice on this key.
+  double damper_on(double key) const {
+    return damper_keys.empty() ? damper_s : value_at(damper_keys, key);
+  }
+  // Returns the curve of a parameter; null if all voices share its value.
+  const VoiceCurve* curve_of(std::size_t parameter) const {
+    return parameter < curves.size() && curves[parameter] ? &*curves[parameter] : nullptr;
+  }
   double gain_of_loudest_key() const {
     double most_db = 0.0;
     for (const CurvePoint& point : keys_db) {

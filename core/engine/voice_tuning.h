@@ -54,32 +54,50 @@ class VoiceTuning {
   double note_hz(int key, double own_hz) const {
     return own_hz > 0.0 ? own_hz : keys.frequency_hz(static_cast<std::size_t>(key));
   }
-  // Returns `hz`, or 0 if the frequency is above Nyquist or needs an unstable stiffness.
-  double playable_hz(double hz, double highest_factor) const {
-    return hz < 0.5 * rate_hz_ && factor_at(hz) <= highest_factor ? hz : 0.0;
+  // Returns `hz`, or 0 if the frequency is above Nyquist or needs an unstable stiffness on this key.
+  double playable_hz(int key, double hz, double highest_factor) const {
+    return hz < 0.5 * rate_hz_ && factor_at(key, hz) <= highest_factor ? hz : 0.0;
   }
   // Returns the voice's factor on every stiffness, with bend and glide.
   double factor_for(const Voice& voice, const Channels& channels, double highest_factor) const {
     const double bent =
         std::exp2((voice.semitones + channels.zone_semitones(voice.channel) + voice.glide) / 12.0);
-    const double factor =
-        voice.frequency_hz > 0.0 ? factor_at(voice.frequency_hz * bent) : bent * bent;
+    const double factor = voice.frequency_hz > 0.0
+                              ? factor_at(key_of(voice), voice.frequency_hz * bent)
+                              : bent * bent;
     return std::min(factor, highest_factor);
   }
-  // Returns the voice's factor as it would be at the initial value of Playing::along's parameter.
+  // Returns the voice's factor as it would be at the initial values of all parameters.
   double initial_factor(const Voice& voice) const {
-    return playing_.along.at.empty() || voice.frequency_hz <= 0.0
+    return (playing_.along.at.empty() && playing_.key_pitches.empty()) || voice.frequency_hz <= 0.0
                ? voice.factor
                : voice.factor * playing_.pitches.factor_at(voice.frequency_hz) /
-                     factor_at(voice.frequency_hz);
+                     factor_at(key_of(voice), voice.frequency_hz);
   }
 
   KeyTuning keys;
 
  private:
-  double factor_at(double frequency_hz) const {
-    return playing_.along.at.empty() ? playing_.pitches.factor_at(frequency_hz)
-                                     : playing_.along.factor_at(frequency_hz, parameter_);
+  static constexpr int no_key = -1;
+  static int key_of(const Voice& voice) { return voice.has_key ? voice.key : no_key; }
+
+  double factor_at(int key, double frequency_hz) const {
+    const PitchesAlong& along = playing_.along;
+    if (key == no_key || playing_.key_pitches.empty()) {
+      return along.at.empty() ? playing_.pitches.factor_at(frequency_hz)
+                              : along.factor_at(frequency_hz, parameter_);
+    }
+    const double factor =
+        playing_.key_pitches[static_cast<std::size_t>(key)].factor_at(frequency_hz);
+    if (along.at.empty() || parameter_ == along.start) {
+      return factor;
+    }
+    // The key's table holds at the parameter's start.
+    const VoiceCurve* const curve = playing_.curve_of(along.parameter);
+    const auto on_key = [&](double knob) {
+      return along.factor_at(frequency_hz, curve == nullptr ? knob : curve->on_key(key, knob));
+    };
+    return factor * on_key(parameter_) / on_key(along.start);
   }
 
   const Playing& playing_;

@@ -59,7 +59,7 @@ void Voices::start(std::size_t lane, double frequency_hz, double semitones) {
                    .level = 1.0,  // not heard yet, so not yet the quietest
                    .frequency_hz = frequency_hz,
                    .semitones = semitones,
-                   .release_s = playing_.damper_s};
+                   .release_s = playing_.damper_on(middle_c)};
   has_changed_ = true;
   latest_ = lane;
 }

@@ -85,7 +85,18 @@ struct alignas(64) Voice {
   double glide_step = 0.0;    // semitones per max_block_frames
   double factor = 1.0;        // factor on every stiffness
   double release_s = 0.0;     // T60 of its damper, by release velocity
+  double velocity = 0.0;      // of its last strike, 0..127, after the velocity curve
 };
+
+// Returns a parameter's value in one voice. `shared`: the value that all voices share, or the knob
+// that moves the parameter's curve. A voice without a key has the shared value, as has a voice that
+// all keys play. [audio] wait-free
+inline double value_in_voice(const Playing& playing, std::size_t parameter, double shared,
+                             const Voice& voice) {
+  const VoiceCurve* const curve =
+      playing.tuning == Tuning::keyboard && voice.has_key ? playing.curve_of(parameter) : nullptr;
+  return curve == nullptr ? shared : curve->at(voice.key, voice.velocity, shared);
+}
 
 // All functions but the constructor: [audio] wait-free, O(voices).
 class Voices {

@@ -22,6 +22,9 @@ std::vector<Setting> keep_values(Scene& scene, std::span<const Setting> kept) {
     for (ParameterSetting& parameter : scene.preset.parameters) {
       if (parameter.name == setting.parameter) {
         const double value = std::clamp(setting.value, parameter.minimum, parameter.maximum);
+        if (!parameter.keys.empty() && !parameter.keys_at) {
+          parameter.keys_at = parameter.value;  // the curve stays where it was
+        }
         before = std::exchange(parameter.value, value);
       }
     }

@@ -100,7 +100,8 @@ std::vector<StrikePulse> blows_of(const ShapeRequest& request) {
   const VelocityCurve velocity{.points = preset.velocity_points,
                                .exponent = std::exp2(-2.0 * preset.velocity)};
   std::vector<StrikePulse> blows;
-  for (const ControlSetting& control : preset.controls) {
+  for (const ControlSetting& setting : preset.controls) {
+    const ControlSetting control = on_key(setting, request.key);
     const int input = find_input(scene.network, control.target);
     if (!request.has_keys || control.source != ControlSource::note || control.turn != 1 ||
         input < 0 || request.key < control.lowest_key || control.highest_key < request.key ||
@@ -118,7 +119,8 @@ std::vector<StrikePulse> blows_of(const ShapeRequest& request) {
                         .rate_hz = to_a_microsecond};
     blows.push_back({.input = static_cast<std::size_t>(input),
                      .strength = stroke.mapped(),
-                     .length_s = static_cast<double>(stroke.pulse_frames()) / to_a_microsecond});
+                     .length_s = static_cast<double>(stroke.pulse_frames()) / to_a_microsecond,
+                     .follows_pitch = control.follows_pitch});
   }
   return blows.empty() ? std::vector<StrikePulse>{{}} : blows;
 }

@@ -71,6 +71,7 @@ bool differs_in_numbers_only(const Preset& a, const Preset& b) {
     preset.budget = {};
     preset.gain = preset.damper_s = preset.glide_s = preset.velocity = 0.0;
     preset.velocity_points.clear();
+    preset.damper_keys.clear();
     preset.decay_s.clear();
     preset.keys_db.clear();
     for (ControlSetting& control : preset.controls) {
@@ -99,7 +100,10 @@ bool differs_in_start_values_only(const Scene& a, const Scene& b) {
   preset.description = a.preset.description;
   if (preset.parameters.size() == a.preset.parameters.size()) {
     for (std::size_t i = 0; i < preset.parameters.size(); ++i) {
-      preset.parameters[i].value = a.preset.parameters[i].value;
+      // A curve without `keys_at` holds at the start value, so a new value moves it.
+      if (preset.parameters[i].keys.empty() || preset.parameters[i].keys_at) {
+        preset.parameters[i].value = a.preset.parameters[i].value;
+      }
     }
   }
   return network == a.network && preset == a.preset;

@@ -226,7 +226,7 @@ FrameTimbre StruckModel::lines_of(std::span<const DecayingPartial> partials, dou
 }
 
 double StruckModel::blow_frames(const StrikePulse& blow, double factor) const {
-  return blow.length_s * options_.rate_hz / std::sqrt(factor);
+  return blow.length_s * options_.rate_hz / (blow.follows_pitch ? std::sqrt(factor) : 1.0);
 }
 
 ModalSound StruckModel::sound_of(const Tuned& tuned) const {

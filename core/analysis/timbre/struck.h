@@ -66,8 +66,10 @@ double jnd_between(TargetFigure figure, double value, double target);
 struct StrikePulse {
   std::size_t input = 0;  // Index into Network::inputs.
   double strength = 1.0;
-  // Length at the model's own pitch; a key shortens it in proportion to its period.
+  // Length at the model's own pitch. If it follows the pitch, a key shortens it in proportion to
+  // its period.
   double length_s = 0.0;
+  bool follows_pitch = true;
 };
 
 struct StrikeOptions {

@@ -63,6 +63,7 @@ std::string print_control(const ControlSetting& control) {
   if (control.longest_ms != usual.longest_ms || control.shortest_ms != usual.shortest_ms) {
     text += "length_ms = " + pair(control.longest_ms, control.shortest_ms) + "\n";
   }
+  text += control.follows_pitch ? "" : "follows_pitch = false\n";
   if (control.lowest_key != usual.lowest_key || control.highest_key != usual.highest_key) {
     text += "keys = [" + std::to_string(control.lowest_key) + ", " +
             std::to_string(control.highest_key) + "]\n";
@@ -184,7 +185,12 @@ std::string edit(std::string_view text, const PresetChanges& changes) {
       more += print_parameter(setting);
     } else if (const toml::node* const value = row->get("value");
                value != nullptr && value->value_or(0.0) != setting.value) {
-      editor.replace(*value, in_toml(setting.value));
+      const bool moves_curve = row->get("keys") != nullptr && row->get("keys_at") == nullptr;
+      editor.replace(*value, in_toml(setting.value) +
+                                 (!moves_curve        ? ""
+                                  : row->is_inline() ? ", keys_at = "
+                                                     : "\nkeys_at = ") +
+                                 (moves_curve ? in_toml(value->value_or(0.0)) : ""));
     }
   }
   std::string end;

@@ -41,6 +41,33 @@ std::string misfit(const Network& network, const ControlSetting& control) {
              : "";
 }
 
+// Returns an error message for the curves of a parameter, or "".
+std::string misfit(const Network& network, const ParameterSetting& setting) {
+  const int index = find_parameter(network, setting.name);
+  if (index < 0) {
+    return no_parameter(network, setting.name);
+  }
+  if (!setting.has_curve()) {
+    return "";
+  }
+  if (network.parameters[static_cast<std::size_t>(index)].audio_input > 0) {
+    return quoted(setting.name) + " is set by an audio input, so it has no curve; remove one of them";
+  }
+  const auto is_read = [&](const Step& step) {
+    return step.op == Op::parameter && step.index == static_cast<std::uint32_t>(index);
+  };
+  for (const Output& output : network.outputs) {
+    const Formula level =
+        output.level == no_argument ? Formula() : network.arguments[output.level];
+    if (std::any_of(level.begin(), level.end(), is_read)) {
+      return quoted(setting.name) +
+             " sets the level of an output, which all voices share, so it has no curve; use "
+             "'keys_db' for a level by key";
+    }
+  }
+  return "";
+}
+
 // Marks all elements with a label; returns false if there are none.
 bool fix(Network& network, const std::string& label) {
   bool is_there = false;
@@ -142,9 +169,8 @@ std::vector<Error> find_preset_errors(const Network& network, const Preset& pres
     }
   }
   for (const ParameterSetting& setting : preset.parameters) {
-    if (find_parameter(network, setting.name) < 0) {
-      found.push_back(
-          {no_parameter(network, setting.name), setting.location.line, setting.location.column});
+    if (std::string message = misfit(network, setting); !message.empty()) {
+      found.push_back({std::move(message), setting.location.line, setting.location.column});
     }
   }
   const auto is_tuned_along = [&](const ParameterSetting& one) {

@@ -6,7 +6,9 @@
 #include <cmath>
 #include <cstdio>
 #include <optional>
+#include <set>
 
+#include "core/model/language/expression.h"
 #include "core/model/language/tokens.h"
 #include "core/model/preset/toml.h"
 #include "core/model/topology.h"
@@ -221,6 +223,99 @@ std::string words_for_how() {
   return words;
 }
 
+// Texts and limits for the points of a curve.
+struct CurveWords {
+  const char* name;
+  const char* example;
+  const char* point;  // meaning of its two numbers
+  double least[2];
+  double most[2];
+  const char* bounds;
+};
+
+// Reads "velocity = [[0, 10], [127, 127]]", or points of three numbers. The first numbers must
+// ascend; `least` and `most` hold for the first number and for all others.
+template <std::size_t count>
+void read_points(const toml::array& rows, TomlTable& reader, const CurveWords& words,
+                 std::vector<std::array<double, count>>& points) {
+  constexpr std::size_t most_points = 16;
+  const std::string name = std::string("'") + words.name + "'";
+  if (rows.size() < 2 || rows.size() > most_points) {
+    reader.fail(rows, name + " has 2 to 16 points: " + words.example);
+    return;
+  }
+  for (const toml::node& row : rows) {
+    const toml::array* const point = row.as_array();
+    const auto is_number = [](const toml::node& node) { return node.is_number(); };
+    if (point == nullptr || point->size() != count ||
+        !std::all_of(point->begin(), point->end(), is_number)) {
+      reader.fail(row, "a point of " + name + " is " + (count == 2 ? "two" : "three") +
+                           " numbers: " + words.point);
+      return;
+    }
+    std::array<double, count> read{};
+    for (std::size_t i = 0; i < count; ++i) {
+      read[i] = *(*point)[i].template value<double>();
+      const std::size_t which = i == 0 ? 0 : 1;
+      if (!(read[i] >= words.least[which] && read[i] <= words.most[which])) {
+        reader.fail(row, words.bounds);
+        return;
+      }
+    }
+    if (!points.empty() && !(read[0] > points.back()[0])) {
+      reader.fail(row, "the points of " + name + " must ascend");
+      return;
+    }
+    points.push_back(read);
+  }
+}
+
+// Reads the curves of a parameter whose range is known.
+void read_curves(const toml::table& row, TomlTable& reader, const Preset& preset,
+                 ParameterSetting& setting) {
+  const std::string range = print_number(setting.minimum) + " to " + print_number(setting.maximum);
+  const std::string in_range = "a key lies between 0 and 127, and its value in the range of " +
+                               quoted(setting.name) + ", " + range;
+  const bool is_by_ratios = setting.minimum > 0.0;
+  const CurveWords keys{.name = "keys",
+                        .example = "[[21, 0.1], [108, 0.4]]",
+                        .point = "[key, value]",
+                        .least = {0.0, setting.minimum},
+                        .most = {127.0, setting.maximum},
+                        .bounds = in_range.c_str()};
+  const CurveWords velocity{
+      .name = "velocity",
+      .example = is_by_ratios ? "[[0, 0.8], [127, 1.2]]" : "[[0, -0.1], [127, 0.1]]",
+      .point = is_by_ratios ? "[velocity, factor]" : "[velocity, offset]",
+      .least = {0.0, is_by_ratios ? 1e-6 : -1e12},
+      .most = {127.0, is_by_ratios ? 1e6 : 1e12},
+      .bounds = is_by_ratios ? "a velocity lies between 0 and 127, its factor between 1e-6 and 1e6"
+                             : "a velocity lies between 0 and 127"};
+  for (const auto& [words, points] :
+       {std::pair(&keys, &setting.keys), std::pair(&velocity, &setting.velocity)}) {
+    const toml::node* const node = row.get(words->name);
+    if (node == nullptr) {
+      continue;
+    }
+    if (!node->is_array()) {
+      reader.fail(*node, quoted(words->name) + " must be points: " + words->example);
+    } else if (!preset.keyboard) {
+      reader.fail(*node, quoted(words->name) +
+                             " has no effect with tuning = \"fixed\", where all keys play the same "
+                             "note; remove one of them");
+    } else {
+      read_points(*node->as_array(), reader, *words, *points);
+    }
+  }
+  double keys_at = 0.0;
+  if (reader.number("keys_at", keys_at, setting.minimum, setting.maximum)) {
+    setting.keys_at = keys_at;
+    if (row.get("keys") == nullptr) {
+      reader.fail(*row.get("keys_at"), "'keys_at' needs 'keys'");
+    }
+  }
+}
+
 void read_parameter(std::string name, const toml::node& node, Preset& preset,
                     std::vector<Error>& errors) {
   ParameterSetting setting{.name = std::move(name), .location = location_of(node)};
@@ -242,6 +337,9 @@ void read_parameter(std::string name, const toml::node& node, Preset& preset,
   if (has_value && has_range &&
       !(setting.minimum <= setting.value && setting.value <= setting.maximum)) {
     reader.fail(node, "the value of " + shown + " lies outside its range");
+  }
+  if (has_range) {
+    read_curves(*row, reader, preset, setting);
   }
   preset.parameters.push_back(std::move(setting));
 }
@@ -312,6 +410,68 @@ void read_round_robin(TomlTable& reader, ControlSetting& control) {
   control.turns = static_cast<int>(turns);
 }
 
+// Returns the pair on a key, joined by straight lines.
+KeyPair pair_on(const std::vector<KeyPair>& points, double key) {
+  std::vector<CurvePoint> low;
+  std::vector<CurvePoint> high;
+  for (const KeyPair& point : points) {
+    low.push_back({point[0], point[1]});
+    high.push_back({point[0], point[2]});
+  }
+  return {key, value_at(low, key), value_at(high, key)};
+}
+
+// A number or a pair of numbers of a control that may differ from key to key.
+struct NumbersByKey {
+  const char* name;
+  const char* example;
+  const char* point;
+  double least;
+  double most;
+  const char* bounds;
+};
+
+// Reads the points of { keys = [[21, 5, 4], [108, 1, 0.6]] } if `name` is a table. Returns true if
+// they are valid; `low` and `high` are then those of middle C.
+template <std::size_t count>
+bool read_by_key(TomlTable& reader, const ControlSetting& control, const NumbersByKey& numbers,
+                 std::vector<KeyPair>& points, double& low, double& high) {
+  const toml::node* const node = reader.get(numbers.name);
+  const toml::table* const table = node == nullptr ? nullptr : node->as_table();
+  if (table == nullptr) {
+    return false;
+  }
+  const toml::array* const rows = table->get_as<toml::array>("keys");
+  if (rows == nullptr || table->size() != 1) {
+    return reader.fail(*node, quoted(numbers.name) + " by key is a table: { keys = " +
+                                  numbers.example + " }");
+  }
+  if (control.source != ControlSource::note || control.gesture == Gesture::parameter) {
+    return reader.fail(*node, quoted(numbers.name) +
+                                  " can differ from key to key only for notes that play an input; "
+                                  "a parameter has 'keys' in [parameters]");
+  }
+  std::vector<std::array<double, count>> read;
+  read_points(*rows, reader,
+              {.name = numbers.name,
+               .example = numbers.example,
+               .point = numbers.point,
+               .least = {0.0, numbers.least},
+               .most = {127.0, numbers.most},
+               .bounds = numbers.bounds},
+              read);
+  if (read.size() != rows->size()) {
+    return false;  // reported
+  }
+  for (const std::array<double, count>& point : read) {
+    points.push_back({point[0], point[1], point[count - 1]});
+  }
+  const KeyPair middle = pair_on(points, middle_c);
+  low = middle[1];
+  high = middle[2];
+  return true;
+}
+
 void read_control(const toml::table& table, Preset& preset, std::vector<Error>& errors,
                   IsReserved is_reserved) {
   const std::size_t before = errors.size();
@@ -349,15 +509,44 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
       reader.fail(*table.get("how"), "'how' must be " + words_for_how());
     }
   }
-  const bool has_range = reader.pair("range", control.low, control.high);
-  const bool has_travel = reader.number("travel", control.travel, 0.0, 1e12);
-  control.has_level = reader.pair("level_db", control.low_db, control.high_db, -120.0, 40.0);
+  const auto pair_or_keys = [&](const NumbersByKey& numbers, std::vector<KeyPair>& points,
+                                double& low, double& high) {
+    const toml::node* const node = reader.get(numbers.name);
+    return node != nullptr && node->is_table()
+               ? read_by_key<3>(reader, control, numbers, points, low, high)
+               : reader.pair(numbers.name, low, high, numbers.least, numbers.most);
+  };
+  const bool has_range =
+      pair_or_keys({"range", "[[21, 0.1, 1], [108, 0.2, 2]]", "[key, low, high]", -1e12, 1e12,
+                    "a key lies between 0 and 127"},
+                   control.range_keys, control.low, control.high);
+  const toml::node* const travel = reader.get("travel");
+  double same_travel = 0.0;
+  const bool has_travel =
+      travel != nullptr && travel->is_table()
+          ? read_by_key<2>(reader, control,
+                           {"travel", "[[21, 0.1], [108, 0.02]]", "[key, travel]", 0.0, 1e12,
+                            "a key lies between 0 and 127, and its travel is not negative"},
+                           control.travel_keys, control.travel, same_travel)
+          : reader.number("travel", control.travel, 0.0, 1e12);
+  control.has_level =
+      pair_or_keys({"level_db", "[[21, -30, 0], [108, -30, 3]]", "[key, low, high]", -120.0, 40.0,
+                    "a key lies between 0 and 127, its dB between -120 and 40"},
+                   control.level_keys, control.low_db, control.high_db);
   if (control.has_level && control.gesture == Gesture::parameter) {
     reader.fail(*table.get("level_db"), "'level_db' is for controls of inputs, not of parameters");
   }
-  if (reader.pair("length_ms", control.longest_ms, control.shortest_ms, 0.0, 1e3) &&
+  if (pair_or_keys({"length_ms", "[[21, 5, 4], [108, 1.1, 0.6]]", "[key, longest, shortest]", 0.0,
+                    1e3, "a key lies between 0 and 127, its lengths between 0 and 1000 ms"},
+                   control.length_keys, control.longest_ms, control.shortest_ms) &&
       control.gesture != Gesture::impulse && control.gesture != Gesture::swing) {
     reader.fail(*table.get("length_ms"), "'length_ms' is for impulses and swings only");
+  }
+  constexpr Gesture scaled[] = {Gesture::pluck, Gesture::bow, Gesture::impulse, Gesture::swing};
+  if (reader.flag("follows_pitch", control.follows_pitch) &&
+      std::find(std::begin(scaled), std::end(scaled), control.gesture) == std::end(scaled)) {
+    reader.fail(*table.get("follows_pitch"),
+                "'follows_pitch' is for plucks, bows, impulses and swings");
   }
   double lowest = 0.0;
   double highest = 127.0;
@@ -372,6 +561,8 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
       reader.fail(*table.get("unit"), "'unit' must be position or swing");
     } else if (control.in_swings && control.gesture != Gesture::touch) {
       reader.fail(*table.get("unit"), "only a touch is measured in swings");
+    } else if (control.in_swings && !control.range_keys.empty()) {
+      reader.fail(*table.get("unit"), "a range in swings is the same on all keys");
     }
   }
   std::string curve = "linear";
@@ -379,13 +570,18 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
     reader.fail(*table.get("curve"), "'curve' must be linear or exponential");
   }
   control.exponential = curve == "exponential";
-  if (control.exponential && (has_range || table.get("range") == nullptr) &&
-      !(control.low * control.high > 0.0)) {
+  const bool is_one_sided =
+      control.low * control.high > 0.0 &&
+      std::all_of(control.range_keys.begin(), control.range_keys.end(),
+                  [&](const KeyPair& point) { return point[1] * point[2] > 0.0; });
+  if (control.exponential && (has_range || table.get("range") == nullptr) && !is_one_sided) {
     reader.fail(table, "an exponential curve needs a range on one side of 0");
   }
   const GestureRow& gesture = row_of(control.gesture);
   if (!gesture.needs_travel.empty() && (has_travel || table.get("travel") == nullptr) &&
-      !(control.travel > 0.0)) {
+      !(control.travel > 0.0 &&
+        std::all_of(control.travel_keys.begin(), control.travel_keys.end(),
+                    [](const KeyPair& point) { return point[1] > 0.0; }))) {
     reader.fail(table, "a " + std::string(gesture.name) +
                            " needs 'travel': " + std::string(gesture.needs_travel));
   }
@@ -409,47 +605,6 @@ void read_channels(const toml::node& node, TomlTable& reader, Preset& preset) {
       return;
     }
     preset.channels |= 1U << (*number - 1);
-  }
-}
-
-// Texts and limits for the points of a curve.
-struct CurveWords {
-  const char* name;
-  const char* example;
-  const char* point;  // meaning of its two numbers
-  double least[2];
-  double most[2];
-  const char* bounds;
-};
-
-// Reads "velocity = [[0, 10], [127, 127]]". The first numbers must ascend.
-void read_points(const toml::array& rows, TomlTable& reader, const CurveWords& words,
-                 std::vector<CurvePoint>& points) {
-  constexpr std::size_t most_points = 16;
-  const std::string name = std::string("'") + words.name + "'";
-  if (rows.size() < 2 || rows.size() > most_points) {
-    reader.fail(rows, name + " has 2 to 16 points: " + words.example);
-    return;
-  }
-  for (const toml::node& row : rows) {
-    const toml::array* const point = row.as_array();
-    if (point == nullptr || point->size() != 2 || !(*point)[0].is_number() ||
-        !(*point)[1].is_number()) {
-      reader.fail(row, "a point of " + name + " is two numbers: " + words.point);
-      return;
-    }
-    const CurvePoint read = {*(*point)[0].value<double>(), *(*point)[1].value<double>()};
-    for (std::size_t i = 0; i < read.size(); ++i) {
-      if (!(read[i] >= words.least[i] && read[i] <= words.most[i])) {
-        reader.fail(row, words.bounds);
-        return;
-      }
-    }
-    if (!points.empty() && !(read[0] > points.back()[0])) {
-      reader.fail(row, "the points of " + name + " must ascend");
-      return;
-    }
-    points.push_back(read);
   }
 }
 
@@ -631,7 +786,20 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
   reader.text("description", preset.description);
   reader.integer("voices", preset.voices, 1, max_voices);
   reader.number("gain", preset.gain, 0.0, 1e9);
-  reader.number("damper_s", preset.damper_s, 0.0, 60.0);
+  read_by_key(root, reader,
+              {.name = "damper_s",
+               .example = "[[21, 0.4], [88, 0.2], [89, 0]]",
+               .point = "[key, seconds]",
+               .least = {0.0, 0.0},
+               .most = {127.0, 60.0},
+               .bounds = "a key lies between 0 and 127, its seconds between 0 and 60"},
+              preset.damper_keys);
+  if (!preset.damper_keys.empty()) {
+    preset.damper_s = value_at(preset.damper_keys, middle_c);
+    if (preset.damper_keys.size() == 1) {
+      preset.damper_keys.clear();  // one number for all keys
+    }
+  }
   reader.flag("noise", preset.noise);
   reader.integer("transpose", preset.transpose, -96, 96);
   reader.integer("pitch_mode", preset.pitch_mode, 1, most_pitch_mode);
@@ -715,6 +883,51 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
 }
 
 }  // namespace
+
+std::vector<double> curve_keys(const ControlSetting& control) {
+  std::set<double> keys;
+  for (const auto* const points : {&control.range_keys, &control.travel_keys, &control.level_keys,
+                                   &control.length_keys}) {
+    for (const KeyPair& point : *points) {
+      keys.insert(point[0]);
+    }
+  }
+  return {keys.begin(), keys.end()};
+}
+
+ControlSetting on_key(ControlSetting control, double key) {
+  const auto take = [&](const std::vector<KeyPair>& points, double& low, double& high) {
+    if (!points.empty()) {
+      const KeyPair pair = pair_on(points, key);
+      low = pair[1];
+      high = pair[2];
+    }
+  };
+  double same_travel = 0.0;
+  take(control.range_keys, control.low, control.high);
+  take(control.travel_keys, control.travel, same_travel);
+  take(control.level_keys, control.low_db, control.high_db);
+  take(control.length_keys, control.longest_ms, control.shortest_ms);
+  return control;
+}
+
+std::string curve_text(const Preset& preset, std::string_view parameter) {
+  std::string text;
+  const auto add = [&](const char* name, const std::vector<CurvePoint>& points) {
+    for (const CurvePoint& point : points) {
+      text += &point != &points.front() ? ", " : text.empty() ? name : std::string("; ") + name;
+      text += print_number(point[0]) + ": " + print_number(point[1]);
+    }
+  };
+  for (const ParameterSetting& setting : preset.parameters) {
+    if (setting.name == parameter) {
+      add("keys ", setting.keys);
+      text += setting.keys_at ? " at " + print_number(*setting.keys_at) : "";
+      add("velocity ", setting.velocity);
+    }
+  }
+  return text;
+}
 
 ParsedPreset parse_preset(std::string_view text, IsReserved is_reserved) {
   ParsedPreset read;

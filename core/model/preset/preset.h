@@ -3,6 +3,7 @@
 // contains names, not indices.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <span>
 #include <string>
@@ -25,10 +26,18 @@ struct ParameterSetting {
   double minimum = 0.0;  // range for controllers, OSC and the console
   double maximum = 0.0;
   SourceLocation location;
+  // Curves that make the value differ from voice to voice; empty: all voices share it.
+  std::vector<CurvePoint> keys = {};      // key and value, ascending
+  std::vector<CurvePoint> velocity = {};  // velocity 0..127 and factor or offset, ascending
+  std::optional<double> keys_at = {};     // knob's value at which `keys` holds; nullopt: `value`
+  bool has_curve() const { return !keys.empty() || !velocity.empty(); }
   bool operator==(const ParameterSetting&) const = default;
 };
 
 enum class ControlSource { note, controller, pressure, osc, audio };
+
+// A key and two numbers, such as the low and the high end of a range.
+using KeyPair = std::array<double, 3>;
 
 struct ControlSetting {
   ControlSource source = ControlSource::note;
@@ -48,6 +57,13 @@ struct ControlSetting {
   double high_db = 0.0;
   double longest_ms = 0.0;  // duration of an impulse for 0 and for 1; 0: one sample
   double shortest_ms = 0.0;
+  // The same numbers by key, ascending; empty: on all keys alike. The numbers above are then those
+  // of middle C. The third number of `travel_keys` is not used.
+  std::vector<KeyPair> range_keys = {};
+  std::vector<KeyPair> travel_keys = {};
+  std::vector<KeyPair> level_keys = {};
+  std::vector<KeyPair> length_keys = {};
+  bool follows_pitch = true;  // speeds, forces and durations scale with the key's pitch
   int lowest_key = 0;
   int highest_key = 127;
   int turn = 1;  // place of a note's control among `turns` round-robin controls
@@ -55,6 +71,11 @@ struct ControlSetting {
   SourceLocation location;
   bool operator==(const ControlSetting&) const = default;
 };
+
+// Returns the keys at which a number of the control is given, ascending, and the control with the
+// numbers of one key. [any thread but audio]
+std::vector<double> curve_keys(const ControlSetting& control);
+ControlSetting on_key(ControlSetting control, double key);
 
 // A stop of a morph: a preset, or values of the model's parameters.
 struct MorphSetting {
@@ -74,6 +95,7 @@ struct Preset {
   int voices = 1;
   double gain = 1.0;      // output per unit of position
   double damper_s = 0.0;  // T60 after note-off; 0: no damper
+  std::vector<CurvePoint> damper_keys;  // the same by key; replaces `damper_s`, then of middle C
   // Additional T60 of a held note, by key: keys and seconds, ascending; empty: none.
   std::vector<CurvePoint> decay_s;
   std::vector<CurvePoint> keys_db;  // gain by key: keys and dB, ascending; empty: 0
@@ -120,6 +142,9 @@ struct PresetKey {
   std::string_view does;
 };
 std::span<const PresetKey> preset_keys();
+
+// Returns a parameter's curves in words, as "keys 21: 5e-05, 108: 0.004"; "" if it has none.
+std::string curve_text(const Preset& preset, std::string_view parameter);
 
 struct ParsedPreset {
   Preset preset;              // complete only if ok()

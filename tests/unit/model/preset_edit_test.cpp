@@ -58,6 +58,18 @@ TEST_CASE("edits replace values and keep comments", "[preset_edit]") {
   CHECK(all == replaced(wanted, "value = 0 }", "value = 0.5 }"));
 }
 
+TEST_CASE("a turned knob keeps its effect on a curve", "[preset_edit]") {
+  const std::string curved =
+      "model = \"a.mdl\"\ngain = 1.0\n[parameters]\n"
+      "K = { value = 0.1, range = [0.01, 1], keys = [[21, 0.1], [90, 0.2]] }\n";
+  const auto once = edit_preset(curved, {"a.mdl", 1.0, {{"K", 0.2, 0.01, 1.0}}, {}});
+  REQUIRE(once);
+  CHECK(*once == replaced(curved, "value = 0.1,", "value = 0.2, keys_at = 0.1,"));
+  const auto twice = edit_preset(*once, {"a.mdl", 1.0, {{"K", 0.3, 0.01, 1.0}}, {}});
+  REQUIRE(twice);
+  CHECK(*twice == replaced(curved, "value = 0.1,", "value = 0.3, keys_at = 0.1,"));
+}
+
 TEST_CASE("a new parameter is added after the others", "[preset_edit]") {
   const std::string all =
       edited({.model = "a.mdl", .gain = 2.0, .parameters = {{"M", 1.0, 0.5, 2.0}}});
