@@ -210,6 +210,34 @@ TEST_CASE("reserved OSC addresses are rejected", "[preset]") {
   CHECK(control_of("to = \"in1\"\nfrom = \"" + longest + "\"").address == longest);
 }
 
+TEST_CASE("numbers by key are read", "[preset]") {
+  const auto read = parse_preset(
+      "model = \"x.mdl\"\ndamper_s = [[21, 0.4], [99, 0.01], [100, 0]]\n"
+      "[parameters]\nB = { value = 1, range = [0.5, 9], keys = [[21, 1], [60, 3]], "
+      "velocity = [[0, 0.5], [127, 2]], keys_at = 2 }\n"
+      "[[control]]\nfrom = \"note\"\nto = \"in1\"\nhow = \"swing\"\nfollows_pitch = false\n"
+      "range = { keys = [[40, 1, 2], [80, 3, 6]] }\ntravel = { keys = [[40, 1], [80, 2]] }\n"
+      "level_db = { keys = [[40, -30, 0], [80, -20, 4]] }\n"
+      "length_ms = { keys = [[20, 5, 4], [60, 3, 2]] }\n");
+  INFO((read.ok() ? "" : read.errors[0].message));
+  REQUIRE(read.ok());
+  const Preset& preset = read.preset;
+  CHECK(preset.damper_keys == std::vector<CurvePoint>{{21, 0.4}, {99, 0.01}, {100, 0}});
+  CHECK(preset.damper_s == Approx(0.205));
+  CHECK(curve_text(preset, "B") == "keys 21: 1, 60: 3 at 2; velocity 0: 0.5, 127: 2");
+  const ControlSetting& control = preset.controls[0];
+  CHECK_FALSE(control.follows_pitch);
+  CHECK(control.low == 2.0);  // on middle C
+  CHECK(control.high == 4.0);
+  CHECK(curve_keys(control) == std::vector<double>{20, 40, 60, 80});
+  const ControlSetting lower = on_key(control, 40);
+  CHECK(lower.high == 2.0);
+  CHECK(lower.travel == 1.0);
+  CHECK(lower.low_db == -30.0);
+  CHECK(lower.longest_ms == 4.0);
+  CHECK(lower.shortest_ms == 3.0);
+}
+
 TEST_CASE("errors in presets have a line and a column", "[preset]") {
   const std::string m = "model = \"x.mdl\"\n";
   const std::string to = "to = \"in1\"\n";
@@ -254,20 +282,20 @@ TEST_CASE("errors in presets have a line and a column", "[preset]") {
       {m + "[parameters]\nK = { value = 1, range = [0, 1], unit = 1 }", 3, 41,
        "unknown key 'unit' in the parameter 'K'; there are value, range, keys, "
        "velocity, keys_at"},
-      {m + "[parameters]\nK = { value = 1, range = [1, 2], keys = [[21, 1], [60, 2.5]] }", 3, 50,
+      {m + "[parameters]\nK = { value = 1, range = [1, 2], keys = [[21, 1], [60, 2.5]] }", 3, 51,
        "a key lies between 0 and 127, and its value in the range of 'K', 1 to 2"},
-      {m + "[parameters]\nK = { value = 1, range = [1, 2], keys = [[60, 1], [21, 2]] }", 3, 50,
+      {m + "[parameters]\nK = { value = 1, range = [1, 2], keys = [[60, 1], [21, 2]] }", 3, 51,
        "the points of 'keys' must ascend"},
-      {m + "[parameters]\nK = { value = 1, range = [1, 2], velocity = [[0, 0], [127, 1]] }", 3, 45,
+      {m + "[parameters]\nK = { value = 1, range = [1, 2], velocity = [[0, 0], [127, 1]] }", 3, 46,
        "a velocity lies between 0 and 127, its factor between 1e-6 and 1e6"},
-      {m + "[parameters]\nK = { value = 1, range = [1, 2], keys_at = 1 }", 3, 43,
+      {m + "[parameters]\nK = { value = 1, range = [1, 2], keys_at = 1 }", 3, 44,
        "'keys_at' needs 'keys'"},
       {m + "tuning = \"fixed\"\n[parameters]\nK = { value = 1, range = [1, 2], "
            "keys = [[21, 1], [60, 2]] }",
-       4, 40, "'keys' has no effect with tuning = \"fixed\""},
+       4, 41, "'keys' has no effect with tuning = \"fixed\""},
       {m + "[[control]]\nfrom = \"cc1\"\n" + to + "range = { keys = [[21, 0, 1], [60, 0, 2]] }",
        5, 9, "'range' can differ from key to key only for notes"},
-      {m + "[[control]]\nfrom = \"note\"\n" + to + "range = { keys = [[21, 0], [60, 0]] }", 5, 18,
+      {m + "[[control]]\nfrom = \"note\"\n" + to + "range = { keys = [[21, 0], [60, 0]] }", 5, 19,
        "a point of 'range' is three numbers: [key, low, high]"},
       {m + "[[control]]\nfrom = \"note\"\n" + to + "range = { low = 1 }", 5, 9,
        "'range' by key is a table: { keys = "},
