@@ -57,15 +57,6 @@ std::vector<Control> make_controls(const Network& network, const Preset& preset)
   return controls;
 }
 
-KeyFrequencies make_keys(const Preset& preset) {
-  KeyFrequencies keys = equal_temperament(preset.a4_hz, preset.transpose);
-  const double ratio = preset.a4_hz / usual_a4_hz * std::exp2(preset.transpose / 12.0);
-  for (std::size_t key = 0; key < std::min(keys.size(), preset.keys_hz.size()); ++key) {
-    keys[key] = ratio * preset.keys_hz[key];
-  }
-  return keys;
-}
-
 InputInfo input_info(const Network& network, std::size_t index,
                      const std::vector<Control>& controls) {
   const Input& input = network.inputs[index];
@@ -227,6 +218,15 @@ Preset in_positions(Preset preset, const Network& network, double swing) {
   return preset;
 }
 
+KeyFrequencies key_frequencies(const Preset& preset) {
+  KeyFrequencies keys = equal_temperament(preset.a4_hz, preset.transpose);
+  const double ratio = preset.a4_hz / usual_a4_hz * std::exp2(preset.transpose / 12.0);
+  for (std::size_t key = 0; key < std::min(keys.size(), preset.keys_hz.size()); ++key) {
+    keys[key] = ratio * preset.keys_hz[key];
+  }
+  return keys;
+}
+
 std::vector<std::optional<VoiceCurve>> voice_curves(const Network& network, const Preset& preset,
                                                     const StabilityCheck& stability) {
   std::vector<std::optional<VoiceCurve>> curves;
@@ -267,7 +267,7 @@ Playing make_playing(const Network& network, const Preset& preset, const Proof& 
       .noise = preset.noise,
       .tuning = keys.mode ? Tuning::keyboard : Tuning::fixed,
       .transpose = static_cast<double>(preset.transpose),
-      .keys_hz = make_keys(preset),
+      .keys_hz = key_frequencies(preset),
       .velocity = {.points = preset.velocity_points, .exponent = std::exp2(-2.0 * preset.velocity)},
       .channels = static_cast<ChannelMask>(preset.channels),
       .mono = preset.mono,

@@ -73,6 +73,9 @@ Preset without_swings(Preset preset);
 // Returns the preset with these ranges as positions. `swing`: peak displacement of a loud note.
 Preset in_positions(Preset preset, const Network& network, double swing);
 
+// Returns the frequencies of the preset's keys, transposed.
+KeyFrequencies key_frequencies(const Preset& preset);
+
 // Returns the curves of the parameters whose values differ from voice to voice, [parameter], within
 // the proved ranges. Empty if there are none. [any thread but audio]
 std::vector<std::optional<VoiceCurve>> voice_curves(const Network& network, const Preset& preset,

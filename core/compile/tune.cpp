@@ -7,6 +7,7 @@
 
 #include "core/compile/accuracy/loaded_waveguide.h"
 #include "core/compile/accuracy/pitches.h"
+#include "core/compile/instrument.h"
 #include "core/model/preset/fit.h"
 
 namespace ressort::compile {
@@ -23,16 +24,18 @@ struct FoundPitches {
 // Tunes keys to the lowest mode at these values of the parameters.
 FoundPitches find_pitches(const CompileRequest& request, const Network& network,
                           const Machine& machine, const LowestShapes& shapes,
-                          std::span<const double> parameters) {
+                          std::span<const double> parameters, const PitchWindow& window = {}) {
   const double rate_hz = request.options.rate_hz;
   if (network.waveguides.empty()) {
     return {make_pitches(shapes, stepping_of_lowest(machine, shapes, parameters), rate_hz,
-                         request.rate_ratio)};
+                         request.rate_ratio, window)};
   }
-  if (auto loaded = loaded_waveguide_pitches(machine, parameters, request.options.progress)) {
+  if (auto loaded =
+          loaded_waveguide_pitches(machine, parameters, request.options.progress, window)) {
     return {*std::move(loaded)};
   }
-  return {make_pitches(shapes, {.scheme = Stepping::Scheme::exact}, rate_hz, request.rate_ratio),
+  return {make_pitches(shapes, {.scheme = Stepping::Scheme::exact}, rate_hz, request.rate_ratio,
+                       window),
           true};
 }
 
@@ -122,17 +125,23 @@ PitchesAlong find_pitches_along(const CompileRequest& request, const Network& ne
   return is_found ? *std::move(along) : PitchesAlong();
 }
 
-// Tunes each key at its own values of the parameters. Empty if the curves change no parameter from
-// key to key, or if a mode is missing on any key.
+// Tunes each key at its own values of the parameters, around its frequency. Empty if the curves
+// change no parameter from key to key, or if a mode is missing on any key. `shared`: the pitches at
+// the start values, before sharpened().
 std::vector<Pitches> find_key_pitches(const CompileRequest& request, const Network& network,
-                                      const Machine& machine,
+                                      const Machine& machine, const LowestShapes& shared_shapes,
+                                      const Pitches& shared,
                                       const std::vector<std::optional<VoiceCurve>>& curves) {
   if (std::none_of(curves.begin(), curves.end(),
                    [](const auto& curve) { return curve && !curve->keys.empty(); })) {
     return {};
   }
   request.options.progress.stage("tuning each key at its own parameters");
+  const KeyFrequencies keys_hz = key_frequencies(request.preset);
+  const KeyFrequencies usual_hz =
+      equal_temperament(request.preset.a4_hz, request.preset.transpose);
   std::vector<Pitches> keys;
+  std::optional<LowestShapes> shapes;
   std::vector<double> before;
   for (std::size_t key = 0; key < key_count; ++key) {
     std::vector<double> parameters = machine.parameters;
@@ -141,16 +150,19 @@ std::vector<Pitches> find_key_pitches(const CompileRequest& request, const Netwo
         parameters[i] = curves[i]->on_key(static_cast<double>(key), parameters[i]);
       }
     }
-    if (parameters == before) {
-      keys.push_back(keys.back());
-      continue;
+    if (parameters != before) {
+      shapes = find_shapes(request, network, parameters);
     }
-    const auto shapes = find_shapes(request, network, parameters);
     if (!shapes) {
       return {};
     }
-    keys.push_back(sharpened(find_pitches(request, network, machine, *shapes, parameters).pitches,
-                             request.preset));
+    const double ratio = shared_shapes.mode.frequency_hz / shapes->mode.frequency_hz;
+    const PitchWindow window{.near = &shared,
+                             .frequency_hz = keys_hz[key] > 0.0 ? keys_hz[key] : usual_hz[key],
+                             .ratio = ratio * ratio};
+    keys.push_back(
+        sharpened(find_pitches(request, network, machine, *shapes, parameters, window).pitches,
+                  request.preset));
     before = std::move(parameters);
   }
   return keys;
@@ -175,7 +187,8 @@ TunedKeys tune(const CompileRequest& request, const Network& network, const Anal
   keys.mode = analysis.mode();
   keys.mode->frequency_hz = keys.pitches.frequency_at(1.0);
   keys.along = find_pitches_along(request, network, planned.machine);
-  keys.by_key = find_key_pitches(request, network, planned.machine, curves);
+  keys.by_key = find_key_pitches(request, network, planned.machine, *analysis.shapes,
+                                 found.pitches, curves);
   // The chosen forms allow more stiffness than the published scheme. Keys may use it up to the
   // highest mode that is played.
   if (planned.more > 1.0) {

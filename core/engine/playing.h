@@ -96,7 +96,7 @@ struct Playing {
   double glide_s = 0.0;                  // portamento time, linear in cents
   NoteShare::Part share;                 // the notes that this engine plays, of several engines
   Pitches pitches;                       // pitches of the lowest mode
-  std::vector<Pitches> key_pitches;      // [key] the same with the key's own parameters; may be empty
+  std::vector<Pitches> key_pitches;      // [key] the same at its own parameters, near its pitch; may be empty
   PitchesAlong along;           // replaces `pitches` where a parameter must leave keys in tune
   double highest_factor = 1.0;  // greatest stiffness factor that is proved stable
   std::vector<Limits> home;     // [parameter] range in which highest_factor holds; empty: anywhere

@@ -1,6 +1,7 @@
 // core/engine: from keys to frequencies to the stiffness factor of a voice.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -87,8 +88,16 @@ class VoiceTuning {
       return along.at.empty() ? playing_.pitches.factor_at(frequency_hz)
                               : along.factor_at(frequency_hz, parameter_);
     }
-    const double factor =
-        playing_.key_pitches[static_cast<std::size_t>(key)].factor_at(frequency_hz);
+    // Beyond the key's table, the intervals of the common one hold.
+    const Pitches& own = playing_.key_pitches[static_cast<std::size_t>(key)];
+    const double inside_hz =
+        std::clamp(frequency_hz, own.lowest_hz,
+                   own.lowest_hz * std::exp2(static_cast<double>(own.factors.size() - 1) / 12.0));
+    const double beyond = inside_hz == frequency_hz
+                              ? 1.0
+                              : playing_.pitches.factor_at(frequency_hz) /
+                                    playing_.pitches.factor_at(inside_hz);
+    const double factor = beyond * own.factor_at(inside_hz);
     if (along.at.empty() || parameter_ == along.start) {
       return factor;
     }

@@ -244,7 +244,8 @@ Complex LoadedWaveguide::residual(double log_factor, double decay, double theta)
 
 std::optional<Pitches> loaded_waveguide_pitches(const Machine& machine,
                                                 std::span<const double> parameters,
-                                                const Progress& progress) {
+                                                const Progress& progress,
+                                                const PitchWindow& window) {
   const Program* part = nullptr;
   std::size_t tuned = 0;
   double lowest_hz = 0.0;
@@ -268,7 +269,7 @@ std::optional<Pitches> loaded_waveguide_pitches(const Machine& machine,
   }
   progress.stage("tuning its waveguide");
   LoadedWaveguide waveguide(*part, parameters, tuned, progress);
-  return make_pitches(waveguide, part->rate_hz);
+  return make_pitches(waveguide, part->rate_hz, window);
 }
 
 }  // namespace ressort::compile

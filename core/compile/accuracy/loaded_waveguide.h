@@ -26,6 +26,7 @@ inline constexpr std::size_t most_loading_springs = 96;  // more would take too 
 // audio]
 std::optional<Pitches> loaded_waveguide_pitches(const Machine& machine,
                                                 std::span<const double> parameters,
-                                                const Progress& progress = {});
+                                                const Progress& progress = {},
+                                                const PitchWindow& window = {});
 
 }  // namespace ressort::compile

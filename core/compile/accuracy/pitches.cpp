@@ -168,13 +168,27 @@ class TunedMode final : public TunedMotion {
 
 }  // namespace
 
-Pitches make_pitches(TunedMotion& motion, double rate_hz) {
+Pitches make_pitches(TunedMotion& motion, double rate_hz, const PitchWindow& window) {
+  constexpr std::size_t half_an_octave = 6;
   Pitches pitches;
   double change = 1.0;  // change of the factor by coupled modes, at the semitone above
   const double nyquist = 0.5 * rate_hz * (1.0 - 1e-9);
+  std::size_t count = 0;
   for (double hz = pitches.lowest_hz; hz < nyquist; hz *= std::exp2(1.0 / 12.0)) {
-    pitches.factors.push_back(0.0);
+    ++count;
   }
+  if (window.near != nullptr) {
+    const double semitone = 12.0 * std::log2(window.frequency_hz / pitches.lowest_hz);
+    const auto middle = static_cast<std::size_t>(
+        std::lround(std::clamp(semitone, 0.0, static_cast<double>(count - 1))));
+    const std::size_t first = middle - std::min(middle, half_an_octave);
+    count = std::min(count, middle + half_an_octave + 1) - first;
+    pitches.lowest_hz *= std::exp2(static_cast<double>(first) / 12.0);
+    const double top_hz = pitches.lowest_hz * std::exp2(static_cast<double>(count - 1) / 12.0);
+    change = window.ratio * window.near->factor_at(top_hz) /
+             motion.alone_at(2.0 * std::numbers::pi * top_hz / rate_hz);
+  }
+  pitches.factors.resize(count);
   // From the top down, because dampers matter least there.
   for (std::size_t i = pitches.factors.size(); i-- > 0;) {
     const double hz = pitches.lowest_hz * std::exp2(static_cast<double>(i) / 12.0);
@@ -189,9 +203,9 @@ Pitches make_pitches(TunedMotion& motion, double rate_hz) {
 }
 
 Pitches make_pitches(const LowestShapes& shapes, const Stepping& stepping, double rate_hz,
-                     double rate_ratio) {
+                     double rate_ratio, const PitchWindow& window) {
   TunedMode mode(shapes, stepping, rate_ratio);
-  return make_pitches(mode, rate_hz);
+  return make_pitches(mode, rate_hz, window);
 }
 
 Stepping stepping_of_lowest(const Machine& machine, const LowestShapes& shapes,

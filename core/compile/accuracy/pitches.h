@@ -25,14 +25,22 @@ class TunedMotion {
   virtual double decay_at(double factor) const = 0;
 };
 
-// Returns a factor for each semitone of 440 Hz from a tenth of a hertz to half the rate, by
-// Newton's method on the complex pole. [any thread but audio]
-Pitches make_pitches(TunedMotion& motion, double rate_hz);
+// The semitones of a table: all of them, or those within half an octave of one frequency, where
+// another table of similar motion is known.
+struct PitchWindow {
+  const Pitches* near = nullptr;  // the other table; null: all semitones
+  double frequency_hz = 0.0;
+  double ratio = 1.0;  // of the table's factors to those of `near`, roughly
+};
+
+// Returns a factor for each semitone of 440 Hz from a tenth of a hertz to half the rate, or in the
+// window, by Newton's method on the complex pole. [any thread but audio]
+Pitches make_pitches(TunedMotion& motion, double rate_hz, const PitchWindow& window = {});
 
 // The same for the first mode of `shapes`, which are per sample at 44,100 Hz, as the form steps it
 // at rate_hz. Keys do not change dampers. [any thread but audio]
 Pitches make_pitches(const LowestShapes& shapes, const Stepping& stepping, double rate_hz,
-                     double rate_ratio);
+                     double rate_ratio, const PitchWindow& window = {});
 
 // Returns the stepping of the part that contains the lowest mode, at these values of the
 // parameters. The modes of bodies are stepped exactly in every form.
