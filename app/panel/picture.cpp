@@ -141,6 +141,9 @@ Picture make_picture(Engine& engine, const Network& network, std::uint32_t numbe
     };
     const auto is_place = [&](const TapSlot& tap) { return tap.is_on_body() && tap.node == node; };
     if (std::any_of(program.taps.begin(), program.taps.end(), is_place)) {
+      if (program.masses[node] >= network.masses.size()) {
+        return false;  // the bridge of a modal string, which the model does not name
+      }
       return known.insert(struck_name(network, program.masses[node])).second;
     }
     return node < program.moving ||

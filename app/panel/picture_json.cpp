@@ -102,9 +102,10 @@ class NetworkJsonWriter {
     const std::vector<std::uint32_t> starts = macro_starts(*picture_.network);
     for (std::size_t i = 0; i < starts.size(); ++i) {
       const Macro& macro = picture_.network->macros[i];
-      const bool is_body = macro.kind == MacroKind::body && !is_plane_;
-      for (std::uint32_t k = 0; is_body && k < macro.length; ++k) {
-        at_[starts[i] + k]->x = along(macro, macro.length > 1 ? k / (macro.length - 1.0) : 0.5);
+      const bool is_body = consists_of_modes(macro.kind) && !is_plane_;
+      for (std::uint32_t k = 0; is_body && k < macro.length * macro.width; ++k) {
+        at_[starts[i] + k]->x =
+            along(macro, macro.length > 1 ? k / macro.width / (macro.length - 1.0) : 0.5);
       }
     }
     const std::vector<Mass>& written = picture_.network->masses;
@@ -124,12 +125,14 @@ class NetworkJsonWriter {
   // A place on a waveguide lies on its line, a place on a body below its modes.
   std::optional<LayoutPoint> point_of(const Tap& tap, std::uint32_t mass) const {
     const Macro& macro = picture_.network->macros[tap.macro];
-    const double u = std::clamp(argument_value(network_, tap.u, parameters_), 0.0, 1.0);
+    const double u = is_bridge(*picture_.network, tap)
+                         ? 1.0
+                         : std::clamp(argument_value(network_, tap.u, parameters_), 0.0, 1.0);
     if (is_waveguide(macro.kind)) {
       return LayoutPoint{wide_ * u, tops_[tap.macro], mass};
     }
-    if (macro.kind == MacroKind::body) {
-      return LayoutPoint{along(macro, u), tops_[tap.macro] + 1.0, mass};
+    if (consists_of_modes(macro.kind)) {
+      return LayoutPoint{along(macro, u), tops_[tap.macro] + macro.width, mass};
     }
     return std::nullopt;
   }
@@ -211,7 +214,9 @@ class NetworkJsonWriter {
     for (const Macro& macro : network.macros) {
       count(macro.name,
             std::array{macro.mass, macro.stiffness, macro.second_stiffness, macro.damping,
-                       macro.air_damping, macro.impedance, macro.frequency_hz, macro.t60_s});
+                       macro.air_damping, macro.impedance, macro.frequency_hz, macro.t60_s,
+                       macro.inharmonicity, macro.losses[0], macro.losses[1], macro.losses[2],
+                       macro.spread_cents, macro.bridge_loss});
     }
     json out = json::object();
     for (std::size_t i = 0; i < users.size(); ++i) {
@@ -247,7 +252,7 @@ class NetworkJsonWriter {
     for (std::uint32_t mass = 0; has_all && mass < network_.masses.size(); ++mass) {
       const Mass& of = network_.masses[mass];
       if (node_[mass] == nowhere && of.kind != MassKind::point && of.kind != MassKind::junction &&
-          is_tied[mass]) {
+          is_tied[mass] && (at_[mass] || mass < picture_.network->masses.size())) {
         add_node(mass, of.position);
       }
     }

@@ -142,6 +142,9 @@ std::string struck_name(const Network& network, std::uint32_t mass) {
   }
   const Tap& tap = network.taps[network.masses[mass].tap];
   const Macro& macro = network.macros[tap.macro];
+  if (is_bridge(network, tap)) {
+    return macro.name + ":bridge";
+  }
   const std::vector<double> parameters = parameter_values(network);
   const double u = std::clamp(argument_value(network, tap.u, parameters), 0.0, 1.0);
   const double place = u * (static_cast<double>(macro.places.size()) - 1.0);
@@ -164,7 +167,8 @@ std::vector<StruckInfo> find_struck(const Network& network, const Machine& machi
       is_played[program.masses[node]] = true;
     }
     for (const TapSlot& tap : program.taps) {
-      is_played[program.masses[tap.node]] = true;
+      const std::uint32_t place = program.masses[tap.node];
+      is_played[place] = place < network.masses.size();  // not the bridge of a modal string
     }
   }
   std::vector<StruckInfo> struck;

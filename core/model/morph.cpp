@@ -21,9 +21,7 @@ void each_argument(Network& network, F&& f) {
   }
   const auto macros = [&](std::vector<Macro>& all) {
     for (Macro& macro : all) {
-      for (ArgumentId* const id : {&macro.mass, &macro.stiffness, &macro.second_stiffness,
-                                   &macro.damping, &macro.air_damping, &macro.impedance,
-                                   &macro.frequency_hz, &macro.t60_s, &macro.brightness}) {
+      for (ArgumentId* const id : arguments_of(macro)) {
         f(*id, false);
       }
     }

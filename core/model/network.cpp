@@ -46,9 +46,7 @@ class Renumbering {
     new_.third = old_.third;
     place_masses();
     for (Macro& macro : old_.macros) {
-      for (ArgumentId* const id : {&macro.mass, &macro.stiffness, &macro.second_stiffness,
-                                   &macro.damping, &macro.air_damping, &macro.impedance,
-                                   &macro.frequency_hz, &macro.t60_s, &macro.brightness}) {
+      for (ArgumentId* const id : arguments_of(macro)) {
         *id = argument(*id);
       }
       macro.drawing = drawing(macro.drawing);

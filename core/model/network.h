@@ -81,15 +81,18 @@ enum class MacroKind : std::uint8_t {
   body,            // modes, which are its nodes, and named places (see BodyMode)
   waveguide,       // a string as two travelling waves, with fixed ends
   open_waveguide,  // the same with free ends
+  modal_string,    // one to four strings over one bridge as their modes, by pitch and losses
 };
+inline constexpr std::uint32_t most_unison_strings = 4;
 
 // Many masses in one line of the model. Nodes are numbered row by row. Each moving node has mass M,
 // and a damper Zo to 0 if there is air damping.
 struct Macro {
   std::string name;
   MacroKind kind = MacroKind::string;
-  std::uint32_t length = 2;  // nodes, fixed ones included; rows of a mesh; modes of a body
-  std::uint32_t width = 1;   // nodes in a row
+  // Nodes, fixed ones included; rows of a mesh; modes of a body; partials of a modal string.
+  std::uint32_t length = 2;
+  std::uint32_t width = 1;  // nodes in a row; strings of a modal string
   ArgumentId mass = no_argument;
   ArgumentId stiffness = no_argument;
   ArgumentId second_stiffness = no_argument;  // K2
@@ -97,9 +100,14 @@ struct Macro {
   ArgumentId air_damping = no_argument;  // Zo
   // Waveguides only, which have no nodes:
   ArgumentId impedance = no_argument;     // R, force per velocity
-  ArgumentId frequency_hz = no_argument;  // frequency of the lowest partial
+  ArgumentId frequency_hz = no_argument;  // frequency of the lowest partial; modal strings too
   ArgumentId t60_s = no_argument;         // T60 of the lowest partial
   ArgumentId brightness = no_argument;    // 0..1
+  // Modal strings only. Partial n decays at the rate losses[0] + losses[1] n + losses[2] n^3, 1/s.
+  ArgumentId inharmonicity = no_argument;  // B
+  std::array<ArgumentId, 3> losses = {no_argument, no_argument, no_argument};
+  ArgumentId spread_cents = no_argument;  // from the lowest to the highest string
+  ArgumentId bridge_loss = no_argument;   // rate at which the bridge damps one string alone, 1/s
   std::vector<std::string> places;        // names, bodies only
   double position = 0.0;                  // position of every node
   double third = 0.0;                     // see Mass
@@ -108,6 +116,16 @@ struct Macro {
   SourceLocation location;
   bool operator==(const Macro&) const = default;
 };
+
+// Returns pointers to all arguments of a macro.
+template <class OneMacro>
+auto arguments_of(OneMacro& macro) {
+  return std::array{&macro.mass,         &macro.stiffness,     &macro.second_stiffness,
+                    &macro.damping,      &macro.air_damping,   &macro.impedance,
+                    &macro.frequency_hz, &macro.t60_s,         &macro.brightness,
+                    &macro.losses[0],    &macro.losses[1],     &macro.losses[2],
+                    &macro.spread_cents, &macro.inharmonicity, &macro.bridge_loss};
+}
 
 // A mode of a body: an oscillator with the body's mass, and the displacement of each place when the
 // oscillator moves by 1.
@@ -125,7 +143,8 @@ inline bool by_body(const BodyMode& a, const BodyMode& b) {
 }
 
 // A place on a macro, by coordinates from 0 to 1. Its position is interpolated between the nodes
-// around it; on a body, between the mode shapes at two named places.
+// around it; on a body, between the mode shapes at two named places. A tap on a modal string
+// without coordinates is its bridge.
 struct Tap {
   std::uint32_t macro = 0;
   ArgumentId u = no_argument;  // along the length; on a body, from its first place to its last

@@ -47,7 +47,16 @@ class NumberCheck {
                     {"impedance", macro.impedance},
                     {"frequency", macro.frequency_hz},
                     {"T60", macro.t60_s},
-                    {"brightness", macro.brightness}});
+                    {"brightness", macro.brightness},
+                    {"inharmonicity", macro.inharmonicity},
+                    {"loss", macro.losses[0]},
+                    {"loss", macro.losses[1]},
+                    {"loss", macro.losses[2]},
+                    {"detuning", macro.spread_cents},
+                    {"loss", macro.bridge_loss}});
+      if (macro.kind == MacroKind::modal_string) {
+        check_string(macro);
+      }
     }
     for (const BodyMode& mode : network_.modes) {
       check(mode, {{"frequency", mode.frequency_hz}, {"T60", mode.t60_s}});
@@ -99,6 +108,30 @@ class NumberCheck {
         error_ = {message(asked, std::string(mode.name), " is not above 0"), mode.location.line,
                   mode.location.column};
       }
+    }
+  }
+
+  // Checks the signs of a modal string's numbers, and that its highest stiffness is finite.
+  void check_string(const Macro& string) {
+    const auto check_sign = [&](const Asked& asked, bool may_be_zero) {
+      const double value = argument_value(network_, asked.argument, parameters_);
+      if (!error_ && !(value > 0.0 || (may_be_zero && value == 0.0))) {
+        error_ = {message(asked, string.name, may_be_zero ? " is below 0" : " is not above 0"),
+                  string.location.line, string.location.column};
+      }
+    };
+    check_sign({"frequency", string.frequency_hz}, false);
+    check_sign({"inharmonicity", string.inharmonicity}, true);
+    for (const ArgumentId loss :
+         {string.losses[0], string.losses[1], string.losses[2], string.bridge_loss}) {
+      check_sign({"loss", loss}, true);
+    }
+    const double n = string.length;
+    const double hz = argument_value(network_, string.frequency_hz, parameters_) * n * n;
+    const double mass = argument_value(network_, string.mass, parameters_);
+    if (!error_ && !std::isfinite(grown_ * mass * hz * hz)) {
+      error_ = {message({"frequency", string.frequency_hz}, string.name, " is too high"),
+                string.location.line, string.location.column};
     }
   }
 

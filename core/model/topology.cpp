@@ -1,6 +1,7 @@
 #include "core/model/topology.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <numbers>
 #include <tuple>
@@ -74,17 +75,23 @@ void append(Formula& formula, const Formula& part) {
   formula.insert(formula.end(), part.begin(), part.end());
 }
 
-// Returns M ((2 pi f)^2 + (ln 1000 / T60)^2), per sample.
-Formula mode_stiffness(const Formula& mass, const Formula& frequency_hz, const Formula& t60_s) {
+// Returns M ((2 pi f)^2 + s^2), per sample. `rate`: s, the rate of decay per sample.
+Formula mode_stiffness(const Formula& mass, const Formula& frequency_hz, const Formula& rate) {
   constexpr double turn = 2.0 * std::numbers::pi / Network::reference_rate_hz;
-  constexpr double decay = 3.0 * std::numbers::ln10 / Network::reference_rate_hz;
   Formula formula = mass;
   append(formula, frequency_hz);
   append(formula, {{Op::number, 0, turn}, {Op::multiply}, {Op::number, 0, 2.0}, {Op::power}});
-  append(formula, {{Op::number, 0, decay}});
-  append(formula, t60_s);
-  append(formula, {{Op::divide}, {Op::number, 0, 2.0}, {Op::power}, {Op::add}, {Op::multiply}});
+  append(formula, rate);
+  append(formula, {{Op::number, 0, 2.0}, {Op::power}, {Op::add}, {Op::multiply}});
   return folded(std::move(formula));
+}
+
+// Returns ln 1000 / T60, per sample.
+Formula decay_rate(const Formula& t60_s) {
+  Formula formula = {{Op::number, 0, 3.0 * std::numbers::ln10 / Network::reference_rate_hz}};
+  append(formula, t60_s);
+  formula.push_back({Op::divide});
+  return formula;
 }
 
 // Returns 2 M ln 1000 / T60, per sample.
@@ -113,20 +120,176 @@ void add_modes(const Network& network, std::uint32_t body, const Progress& progr
     };
     const Formula& mass = network.arguments[macro.mass];
     const Formula& t60_s = network.arguments[mode->t60_s];
-    expanded.masses.push_back(
-        {.kind = MassKind::oscillator,
-         .mass = macro.mass,
-         .stiffness = add(mode_stiffness(mass, network.arguments[mode->frequency_hz], t60_s)),
-         .damping = add(mode_damping(mass, t60_s)),
-         .is_mode = true,
-         .is_fixed = macro.is_fixed,
-         .location = mode->location});
+    expanded.masses.push_back({.kind = MassKind::oscillator,
+                               .mass = macro.mass,
+                               .stiffness = add(mode_stiffness(
+                                   mass, network.arguments[mode->frequency_hz], decay_rate(t60_s))),
+                               .damping = add(mode_damping(mass, t60_s)),
+                               .is_mode = true,
+                               .is_fixed = macro.is_fixed,
+                               .location = mode->location});
     for (std::size_t place = 0; place < macro.places.size(); ++place) {
       expanded.shapes[first + place * macro.length + at] = mode->shape[place];
     }
     ++at;
   }
 }
+
+// Expands modal strings: modes, mode shapes at the places in use, and the bridge.
+class StringModes {
+ public:
+  StringModes(const Network& network, std::uint32_t macro, Network& expanded)
+      : network_(network),
+        expanded_(expanded),
+        string_(network.macros[macro]),
+        macro_(macro),
+        modes_(string_.length * string_.width) {}
+
+  // Appends the modes as oscillators, partial by partial, and a bridge that damps all strings.
+  void add_nodes(const Progress& progress) {
+    first_ = static_cast<std::uint32_t>(expanded_.masses.size());
+    Formula mass = network_.arguments[string_.mass];
+    append(mass, {{Op::number, 0, 0.5}, {Op::multiply}});
+    mass = folded(std::move(mass));
+    const ArgumentId mass_id = add(mass);
+    for (std::uint32_t n = 1; n <= string_.length; ++n) {
+      const Formula rate = rate_of(n);
+      Formula damping = mass;
+      append(damping, {{Op::number, 0, 2.0}, {Op::multiply}});
+      append(damping, rate);
+      append(damping, {{Op::multiply}});
+      const ArgumentId damping_id = add(folded(std::move(damping)));
+      for (std::uint32_t string = 0; string < string_.width; ++string) {
+        progress.spend(16);
+        expanded_.masses.push_back({.kind = MassKind::oscillator,
+                                    .mass = mass_id,
+                                    .stiffness = add(mode_stiffness(mass, hz_of(n, string), rate)),
+                                    .damping = damping_id,
+                                    .is_mode = true,
+                                    .is_fixed = string_.is_fixed,
+                                    .location = string_.location});
+      }
+    }
+    if (string_.bridge_loss != no_argument) {
+      add_bridge();
+    }
+  }
+
+  // Sets the mode shapes of a place on the string. Constant places are exact. A variable one lies
+  // on a grid, with 16 points in a wave of the highest partial.
+  void place(Tap& tap) {
+    tap.length = modes_;
+    tap.width = 1;
+    tap.first = first_;
+    tap.shape = static_cast<std::uint32_t>(expanded_.shapes.size());
+    tap.places = 1;
+    const double share = 1.0 / string_.width;
+    if (tap.u == no_argument) {
+      return add_shape([&](std::uint32_t n) { return share * n * sign_of(n); });
+    }
+    const Formula& place = network_.arguments[tap.u];
+    const bool is_exact = is_constant(place);
+    tap.places = is_exact ? 1 : 8 * string_.length + 1;
+    for (std::uint32_t i = 0; i < tap.places; ++i) {
+      const double u = is_exact ? std::clamp(evaluate(place, {}), 0.0, 1.0)
+                                : i / static_cast<double>(tap.places - 1);
+      add_shape([&](std::uint32_t n) { return share * std::sin(std::numbers::pi * n * u); });
+    }
+  }
+
+ private:
+  ArgumentId add(Formula formula) {
+    expanded_.arguments.push_back(std::move(formula));
+    return static_cast<ArgumentId>(expanded_.arguments.size() - 1);
+  }
+
+  static double sign_of(std::uint32_t partial) { return partial % 2 == 1 ? 1.0 : -1.0; }
+
+  // Appends the same displacement for each string.
+  template <class OfPartial>
+  void add_shape(OfPartial&& of_partial) {
+    for (std::uint32_t n = 1; n <= string_.length; ++n) {
+      expanded_.shapes.insert(expanded_.shapes.end(), string_.width, of_partial(n));
+    }
+  }
+
+  // Returns n HZ sqrt((1 + B n^2) / (1 + B)), detuned for one of several strings.
+  Formula hz_of(std::uint32_t n, std::uint32_t string) const {
+    const Formula& b = network_.arguments[string_.inharmonicity];
+    Formula stretch = b;
+    append(stretch, {{Op::number, 0, static_cast<double>(n) * n},
+                     {Op::multiply},
+                     {Op::number, 0, 1.0},
+                     {Op::add},
+                     {Op::number, 0, 1.0}});
+    append(stretch, b);
+    append(stretch, {{Op::add},
+                     {Op::divide},
+                     {Op::sqrt},
+                     {Op::number, 0, static_cast<double>(n)},
+                     {Op::multiply}});
+    Formula formula = folded(std::move(stretch));
+    append(formula, network_.arguments[string_.frequency_hz]);
+    formula.push_back({Op::multiply});
+    if (string_.width > 1) {
+      const double octaves = (string / (string_.width - 1.0) - 0.5) / 1200.0;
+      formula.push_back({Op::number, 0, 2.0});
+      append(formula, network_.arguments[string_.spread_cents]);
+      append(formula, {{Op::number, 0, octaves}, {Op::multiply}, {Op::power}, {Op::multiply}});
+    }
+    return formula;
+  }
+
+  // Returns S0 + S1 n + S3 n^3, per sample.
+  Formula rate_of(std::uint32_t n) const {
+    const double number = n;
+    Formula formula = network_.arguments[string_.losses[0]];
+    append(formula, network_.arguments[string_.losses[1]]);
+    append(formula, {{Op::number, 0, number}, {Op::multiply}, {Op::add}});
+    append(formula, network_.arguments[string_.losses[2]]);
+    append(formula, {{Op::number, 0, number * number * number},
+                     {Op::multiply},
+                     {Op::add},
+                     {Op::number, 0, 1.0 / Network::reference_rate_hz},
+                     {Op::multiply}});
+    return folded(std::move(formula));
+  }
+
+  // Appends a damper from the ends of all strings to a ground. A bridge of conductance G loses the
+  // same share of every partial, so all modes move its place alike. It couples the strings
+  // (Weinreich 1977): each loses energy at the rate of the sum of their motions.
+  void add_bridge() {
+    Tap tap{.macro = macro_,
+            .first = first_,
+            .length = modes_,
+            .width = 1,
+            .places = 1,
+            .shape = static_cast<std::uint32_t>(expanded_.shapes.size())};
+    add_shape(sign_of);
+    Mass place{.kind = MassKind::point, .tap = static_cast<std::uint32_t>(expanded_.taps.size())};
+    place.location = string_.location;
+    expanded_.taps.push_back(tap);
+    Mass ground{.kind = MassKind::ground, .location = string_.location};
+    Formula damping = network_.arguments[string_.mass];  // 2 (M/2) g
+    append(damping, network_.arguments[string_.bridge_loss]);
+    append(damping,
+           {{Op::multiply}, {Op::number, 0, 1.0 / Network::reference_rate_hz}, {Op::multiply}});
+    Link damper{.location = string_.location};
+    damper.a = static_cast<std::uint32_t>(expanded_.masses.size());
+    damper.b = damper.a + 1;
+    damper.arguments[1] = add(folded(std::move(damping)));
+    expanded_.masses.push_back(std::move(place));
+    expanded_.masses.push_back(std::move(ground));
+    expanded_.links.push_back(std::move(damper));
+  }
+
+  const Network& network_;
+  Network& expanded_;
+  const Macro& string_;
+  std::uint32_t macro_;
+  std::uint32_t modes_;
+  std::uint32_t first_ = 0;
+};
 
 // Merges points with equal coordinates into one node, which on a waveguide is a junction.
 void join_places(const Network& network, Network& expanded) {
@@ -214,6 +377,14 @@ bool has_waveguide(const Network& network) {
                      [](const Macro& macro) { return is_waveguide(macro.kind); });
 }
 
+bool consists_of_modes(MacroKind kind) {
+  return kind == MacroKind::body || kind == MacroKind::modal_string;
+}
+
+bool is_bridge(const Network& network, const Tap& tap) {
+  return network.macros[tap.macro].kind == MacroKind::modal_string && tap.u == no_argument;
+}
+
 bool is_mesh(MacroKind kind) {
   return kind == MacroKind::mesh || kind == MacroKind::closed_mesh ||
          kind == MacroKind::corner_mesh;
@@ -237,16 +408,21 @@ bool is_fixed(const Macro& macro, std::uint32_t node) {
     case MacroKind::body:
     case MacroKind::waveguide:
     case MacroKind::open_waveguide:
+    case MacroKind::modal_string:
       return false;
   }
   return false;
 }
 
 std::uint64_t node_count(const Macro& macro) {
-  return is_waveguide(macro.kind) ? 0 : std::uint64_t{macro.length} * macro.width;
+  const std::uint64_t bridge = macro.bridge_loss == no_argument ? 0 : 2;  // a place and a ground
+  return is_waveguide(macro.kind) ? 0 : std::uint64_t{macro.length} * macro.width + bridge;
 }
 
 std::uint64_t link_count(const Macro& macro) {
+  if (macro.kind == MacroKind::modal_string) {
+    return macro.bridge_loss == no_argument ? 0 : 1;
+  }
   if (macro.kind == MacroKind::body || is_waveguide(macro.kind)) {
     return 0;
   }
@@ -284,20 +460,27 @@ Network expand_macros(const Network& network, const Progress& progress) {
   expanded.links.reserve(links);
   const std::vector<std::uint32_t> first = macro_starts(network);  // [macro]
   std::vector<std::uint32_t> shape;
+  std::map<std::uint32_t, StringModes> strings;  // macro -> its modes
   for (std::uint32_t i = 0; i < network.macros.size(); ++i) {
     const Macro& macro = network.macros[i];
     shape.push_back(static_cast<std::uint32_t>(expanded.shapes.size()));
     if (macro.kind == MacroKind::body) {
       add_modes(network, i, progress, expanded);
+    } else if (macro.kind == MacroKind::modal_string) {
+      strings.try_emplace(i, network, i, expanded).first->second.add_nodes(progress);
     } else if (!is_waveguide(macro.kind)) {
       add_nodes(macro, progress, expanded);
       add_links(macro, first[i], progress, expanded);
     }
   }
-  for (std::size_t i = 0; i < expanded.taps.size(); ++i) {
+  for (std::size_t i = 0; i < network.taps.size(); ++i) {
     Tap& tap = expanded.taps[i];
     const Macro& macro = network.macros[network.taps[i].macro];
     if (is_waveguide(macro.kind)) {
+      continue;
+    }
+    if (const auto string = strings.find(tap.macro); string != strings.end()) {
+      string->second.place(tap);
       continue;
     }
     tap.length = macro.length;

@@ -17,6 +17,10 @@ bool is_on_waveguide(const Network& network, std::uint32_t mass);  // a place, e
 bool has_waveguide(const Network& network);
 bool is_mesh(MacroKind kind);  // with length and width
 
+// Returns true for bodies and modal strings.
+bool consists_of_modes(MacroKind kind);
+// Returns true for the place `bridge` of a modal string.
+bool is_bridge(const Network& network, const Tap& tap);
 std::uint64_t node_count(const Macro& macro);
 std::uint64_t link_count(const Macro& macro);  // after expansion
 

@@ -75,7 +75,7 @@ class LayoutMaker {
               {static_cast<double>(i), top + static_cast<double>(j), first + i * macro.width + j});
         }
       }
-      first += macro.length * macro.width;
+      first += static_cast<std::uint32_t>(node_count(macro));
       top += static_cast<double>(macro.width) + 1.0;
     }
     return layout;

@@ -134,7 +134,7 @@ Result<std::vector<SpringLine>> spring_lines(const Network& network, std::string
   }
   for (std::uint32_t i = 0; i < network.macros.size(); ++i) {
     const Macro& macro = network.macros[i];
-    if (is_in(parts.of_macro(i)) && (macro.kind == MacroKind::body || is_waveguide(macro.kind))) {
+    if (is_in(parts.of_macro(i)) && (consists_of_modes(macro.kind) || is_waveguide(macro.kind))) {
       return Error{
           "'" + macro.name + "' gets its frequencies from its own lines; change them there",
           macro.location.line, macro.location.column};

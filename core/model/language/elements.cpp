@@ -395,11 +395,16 @@ std::optional<std::uint32_t> Reader::tap(const Line& line, const Token& token, c
               (is_plane  ? "two coordinates, [@m u v], each from 0 to 1"
                : is_body ? "its name, [" + std::string(label.text) + " " +
                                (places.empty() ? "place" : places.front()) + "]"
-                         : "one coordinate, [@s u], from 0 to 1"));
+               : keyword.macro == MacroKind::modal_string
+                   ? "one coordinate, [@s u], from 0 to 1, or its bridge, [@s bridge]"
+                   : "one coordinate, [@s u], from 0 to 1"));
     return std::nullopt;
   }
   if (is_body && is_identifier(coordinates[0].text)) {
     return named_place(line, token, *macro, coordinates[0]);
+  }
+  if (keyword.macro == MacroKind::modal_string && coordinates[0].text == bridge_name) {
+    return add_point(line, token, {.macro = *macro});
   }
   for (const Token& coordinate : coordinates) {
     double number = 0.0;

@@ -26,6 +26,7 @@ constexpr Keyword fixed[] = {
     {"mode",               Element::body_mode,       0, 4, 3 + most_body_places, false, "@BODY HZ T60 DISPLACEMENT..."},
     {"waveguide",          Element::macro,           0, 5, 5, false, "R HZ T60 BRIGHTNESS POSITION", MacroKind::waveguide},
     {"openWaveguide",      Element::macro,           0, 5, 5, false, "R HZ T60 BRIGHTNESS POSITION", MacroKind::open_waveguide},
+    {"modalString",        Element::macro,           0, 7, 10, false, "PARTIALS M HZ B S0 S1 S3 [STRINGS CENTS BRIDGE]", MacroKind::modal_string},
     {"posInput",           Element::position_input,  0, 1, 1, true,  "POSITION"},
     {"frcInput",           Element::force_input,     1, 0, 0, false, "@MASS"},
     {"forceInput",         Element::force_input,     1, 0, 0, false, "@MASS"},

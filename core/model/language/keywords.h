@@ -32,6 +32,7 @@ inline bool is_parameter(Element element) {
 }
 
 inline constexpr int most_body_places = 256;
+inline constexpr std::string_view bridge_name = "bridge";  // a place on every modal string
 
 // The description of a keyword. The reader, its messages and its suggestions use this list only.
 struct Keyword {

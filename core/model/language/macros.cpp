@@ -23,6 +23,9 @@ void Reader::add_macro(const Line& line) {
   if (is_waveguide(macro.kind)) {
     return add_waveguide(line, macro);
   }
+  if (macro.kind == MacroKind::modal_string) {
+    return add_modal_string(line, macro);
+  }
   std::size_t at = 0;
   macro.length = size(line, at++, macro.kind == MacroKind::stiff_string ? 3 : 2);
   macro.width = is_mesh(macro.kind) ? size(line, at++, 2) : 1;
@@ -79,6 +82,42 @@ void Reader::add_waveguide(const Line& line, Macro& guide) {
   if (is_placed || !line.group.empty()) {
     out_.network.drawings.push_back({.group = std::string(line.group), .x = x, .y = y});
     guide.drawing = static_cast<std::uint32_t>(out_.network.drawings.size());
+  }
+}
+
+void Reader::add_modal_string(const Line& line, Macro& string) {
+  string.length = size(line, 0, 1);
+  string.mass = argument(line, 1);
+  check_mass(line, 1, string.mass);
+  string.frequency_hz = positive(line, 2, "a string's frequency in Hz");
+  string.inharmonicity = not_negative(line, 3, "a string's inharmonicity B");
+  for (std::size_t i = 0; i < string.losses.size(); ++i) {
+    string.losses[i] = not_negative(line, 4 + i, "a loss in 1/s");
+  }
+  if (line.rest.size() > 7) {
+    if (line.rest.size() < 10) {
+      return error(line, line.rest.back(),
+                   "STRINGS, CENTS and BRIDGE belong together: give all three or none");
+    }
+    string.width = size(line, 7, 1);
+    if (string.width > most_unison_strings) {
+      string.width = 1;
+      error(line, line.rest[7],
+            "a note has 1 to " + std::to_string(most_unison_strings) + " strings, found " +
+                quoted(line.rest[7].text));
+    }
+    string.spread_cents = argument(line, 8);
+    string.bridge_loss = not_negative(line, 9, "the bridge's loss in 1/s");
+  }
+  nodes_ += node_count(string);
+  if (nodes_ > most_nodes_) {
+    string.length = 1;
+    error(line, line.rest[0],
+          "the macros have more than " + std::to_string(most_nodes_) + " nodes in all");
+  }
+  if (!line.group.empty()) {
+    out_.network.drawings.push_back({.group = std::string(line.group)});
+    string.drawing = static_cast<std::uint32_t>(out_.network.drawings.size());
   }
 }
 
@@ -163,6 +202,16 @@ ArgumentId Reader::positive(const Line& line, std::size_t at, const std::string&
   if (id != no_argument && is_constant(out_.network.arguments[id]) &&
       !(argument_value(out_.network, id, {}) > 0.0)) {
     error(line, line.rest[at], what + " must be above 0, found " + quoted(line.rest[at].text));
+  }
+  return id;
+}
+
+// Reads an argument and reports a constant below 0. If a parameter sets it, the compiler checks it.
+ArgumentId Reader::not_negative(const Line& line, std::size_t at, const std::string& what) {
+  const ArgumentId id = argument(line, at);
+  if (id != no_argument && is_constant(out_.network.arguments[id]) &&
+      argument_value(out_.network, id, {}) < 0.0) {
+    error(line, line.rest[at], what + " must not be below 0, found " + quoted(line.rest[at].text));
   }
   return id;
 }

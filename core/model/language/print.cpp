@@ -186,6 +186,10 @@ class Printer {
         print_body(macro);
         continue;
       }
+      if (macro.kind == MacroKind::modal_string) {
+        print_modal_string(macro);
+        continue;
+      }
       if (is_waveguide(macro.kind)) {
         line(macro.name, keyword_of(macro).word,
              arguments({macro.impedance, macro.frequency_hz, macro.t60_s, macro.brightness}) +
@@ -226,6 +230,17 @@ class Printer {
                               : mode->name.text(),
            "mode", rest);
     }
+  }
+
+  void print_modal_string(const Macro& string) {
+    const bool has_bridge = string.bridge_loss != no_argument;
+    line(string.name, keyword_of(string).word,
+         " " + std::to_string(string.length) +
+             arguments({string.mass, string.frequency_hz, string.inharmonicity, string.losses[0],
+                        string.losses[1], string.losses[2]}) +
+             (has_bridge ? " " + std::to_string(string.width) +
+                               arguments({string.spread_cents, string.bridge_loss})
+                         : std::string()));
   }
 
   void print_links() {
@@ -293,6 +308,9 @@ class Printer {
     }
     if (const Macro& macro = network_.macros[tap.macro]; macro.kind == MacroKind::body) {
       return "[@" + macro.name + " " + place_on(macro, tap.u) + "]";
+    }
+    if (is_bridge(network_, tap)) {
+      return "[@" + network_.macros[tap.macro].name + " " + std::string(bridge_name) + "]";
     }
     return "[@" + network_.macros[tap.macro].name + coordinate(tap.u) +
            (tap.v == no_argument ? "" : coordinate(tap.v)) + "]";

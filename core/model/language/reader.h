@@ -107,6 +107,8 @@ class Reader {
   double displacement(const Line& line, std::size_t at);
   std::optional<double> place_called(const Macro& body, const Token& token) const;
   void add_waveguide(const Line& line, Macro& guide);
+  void add_modal_string(const Line& line, Macro& string);
+  ArgumentId not_negative(const Line& line, std::size_t at, const std::string& what);
   std::uint32_t size(const Line& line, std::size_t at, std::uint32_t least);
   void add_link(Line& line);
   void choose_profile(Link& link) const;

@@ -70,7 +70,8 @@ class Builder {
       case MacroKind::chain:
       case MacroKind::mesh:
       case MacroKind::body:
-      case MacroKind::waveguide:  // The reference simulator has no waveguides.
+      case MacroKind::waveguide:  // The reference simulator has no waveguides or modal strings.
+      case MacroKind::modal_string:
       case MacroKind::open_waveguide:
         return false;
       case MacroKind::string:
