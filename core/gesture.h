@@ -26,6 +26,7 @@ enum class Gesture : std::uint8_t {
   swing,
   hold,
   touch,
+  noise,
   parameter
 };
 
@@ -158,6 +159,9 @@ inline constexpr GestureRow gestures[] = {
                std::copysign(stroke.settings.high * (is_full ? 1.0 : share), stroke.amount);
            driver.draw(stroke.paced(stroke.is_live ? live : stroke.mapped()),
                        stroke.pole_of_speed());
+           if (stroke.settings.roughness > 0.0) {
+             driver.roughen(stroke.settings.roughness, stroke.noise());
+           }
            if (stroke.is_live && stroke.second >= 0.0) {
              stroke.pressure = stroke.second;
            }
@@ -219,6 +223,15 @@ inline constexpr GestureRow gestures[] = {
      .is_touch = true,
      .start = [](const Stroke& control) { return control.settings.low; },
      .goal = [](const Stroke& stroke) { return stroke.mapped(); }},
+    {.gesture = Gesture::noise,
+     .name = "noise",
+     .does = "a burst of noise in `band_hz`: its rms is from `range`, its T60 from `length_ms`; of "
+             "displacement if the input is a position. Pitch does not change it",
+     .is_blow = true,
+     .play =
+         [](InputDriver& driver, Stroke& stroke) {
+           driver.rustle(stroke.pushed(stroke.mapped()), stroke.burst_kept(), stroke.noise());
+         }},
     {.gesture = Gesture::parameter,
      .name = "parameter",
      .does = "no input: changes the parameter that `to` names"},

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "core/noise.h"
 #include "core/raised_cosine.h"
 
 namespace ressort {
@@ -46,6 +47,12 @@ class alignas(64) InputDriver {
     pole_ = pole;
   }
 
+  // Makes the velocity of draws fluctuate: v (1 + level * noise), as rosin and hair do.
+  void roughen(double level, const BandNoise& noise) {
+    roughness_ = level;
+    rough_ = noise;
+  }
+
   // Multiplies the speed of a draw, to follow a change of the voice's pitch.
   void scale_speed(double ratio) {
     if (motion_ == Motion::draw) {
@@ -70,6 +77,15 @@ class alignas(64) InputDriver {
   void push(double force, std::size_t frames) {
     held_ = force;
     held_frames_ = frames;
+  }
+
+  // Adds a burst of noise with this initial rms to the current motion; `kept` is the share of its
+  // level that remains after each sample. A new burst replaces the last one.
+  void rustle(double level, double kept, const BandNoise& noise) {
+    burst_ = level;
+    burst_left_ = 1.0;
+    burst_kept_ = kept;
+    burst_noise_ = noise;
   }
 
   bool is_moving() const {
@@ -119,7 +135,7 @@ class alignas(64) InputDriver {
  private:
   enum class Motion : std::uint8_t { rest, follow, sweep, draw };
 
-  bool is_struck() const { return pulse_ != 0.0 || blow_left_ > 0; }
+  bool is_struck() const { return pulse_ != 0.0 || blow_left_ > 0 || burst_left_ > 0.0; }
 
   double next_pulse() {
     double pulse = pulse_;
@@ -127,6 +143,12 @@ class alignas(64) InputDriver {
     if (blow_left_ > 0) {
       pulse += blow_ * blow_pulse_.at(blow_pulse_.count - blow_left_);
       --blow_left_;
+    }
+    if (burst_left_ > 0.0) {
+      constexpr double inaudible = 1e-5;  // -100 dB of the burst's start
+      pulse += burst_ * burst_left_ * burst_noise_.next();
+      burst_left_ *= burst_kept_;
+      burst_left_ = burst_left_ < inaudible ? 0.0 : burst_left_;
     }
     return pulse;
   }
@@ -147,7 +169,7 @@ class alignas(64) InputDriver {
           value_ += target_ > value_ ? speed_ : -speed_;
         }
         break;
-      case Motion::draw:
+      case Motion::draw: {
         velocity_ += (1.0 - pole_) * (speed_ - velocity_);
         if (speed_ == 0.0 && std::fabs(velocity_) < 1e-12) {
           velocity_ = 0.0;
@@ -155,8 +177,11 @@ class alignas(64) InputDriver {
         }
         // The velocity is returned directly. The difference of two positions would lose precision
         // once the bow has travelled far.
-        value_ += velocity_;
-        return {value_, velocity_};
+        const double velocity =
+            roughness_ == 0.0 ? velocity_ : velocity_ * (1.0 + roughness_ * rough_.next());
+        value_ += velocity;
+        return {value_, velocity};
+      }
     }
     return {value_, value_ - before};
   }
@@ -199,6 +224,7 @@ class alignas(64) InputDriver {
   double bump_ = 0.0;  // displacement by a pulse in this sample
   std::size_t blow_left_ = 0;
   std::size_t held_frames_ = 0;
+  double burst_left_ = 0.0;  // share of the burst's initial level; 0: it is over
   Motion motion_ = Motion::rest;
   double velocity_ = 0.0;
   double target_ = 0.0;
@@ -207,6 +233,11 @@ class alignas(64) InputDriver {
   double blow_ = 0.0;  // sum of the current pulse
   RaisedCosine blow_pulse_;
   double held_ = 0.0;
+  double burst_ = 0.0;       // initial rms
+  double burst_kept_ = 0.0;  // factor per sample
+  BandNoise burst_noise_;
+  double roughness_ = 0.0;  // rms of the fluctuation of a drawn velocity, as a share of it
+  BandNoise rough_;
 };
 
 }  // namespace ressort

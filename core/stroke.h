@@ -3,8 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <optional>
 #include <vector>
+
+#include "core/noise.h"
 
 namespace ressort {
 
@@ -17,9 +20,13 @@ struct GestureSettings {
   bool has_level = false;    // the amount also sets the voice's level, from low_db to high_db
   double low_db = 0.0;
   double high_db = 0.0;
-  double longest_s = 0.0;  // impulse, swing: duration of the softest pulse; 0: one sample
+  // Impulse, swing: duration of the softest and the hardest pulse, 0 is one sample. Noise: T60.
+  double longest_s = 0.0;
   double shortest_s = 0.0;
   bool follows_pitch = true;  // speeds, forces and durations scale with the key's pitch
+  double low_hz = 20.0;       // noise, bow: band of the noise
+  double high_hz = 20000.0;
+  double roughness = 0.0;  // bow: rms of the noise in its speed, as a share of the speed
 };
 
 // The settings of a control at one key.
@@ -64,6 +71,7 @@ struct Stroke {
   double rate_hz = 44100.0;
   double pitch = 1.0;  // the voice's pitch by the written pitch; 1 unless the control follows it
   bool bare = false;   // nothing is smoothed
+  std::uint64_t seed = 0;  // differs from note to note and from input to input
   // Results, set by the gesture.
   std::optional<double> rest;      // position at which drivers of new voices start from now on
   std::optional<double> pressure;  // channel pressure to apply
@@ -86,18 +94,22 @@ struct Stroke {
     const double db = settings.low_db + (settings.high_db - settings.low_db) * part;
     return std::pow(10.0, db / 20.0) * loudness.value_or(1.0);
   }
-  // Returns the duration of a blow. It shrinks in equal ratios from soft to hard. If the control
-  // follows the pitch, it also shrinks in proportion to the period of a higher key, so that all
-  // keys have the same timbre.
-  double pulse_frames() const {
+  // Returns the duration of the gesture. It shrinks in equal ratios from soft to hard.
+  double length_s() const {
     const double longest_s = settings.longest_s;
     const double shortest_s = settings.shortest_s;
     const double a = std::clamp(amount, 0.0, 1.0);
-    const double s = longest_s > 0.0 && shortest_s > 0.0
-                         ? longest_s * std::pow(shortest_s / longest_s, a)
-                         : longest_s + (shortest_s - longest_s) * a;
-    return s * rate_hz / pitch;
+    return longest_s > 0.0 && shortest_s > 0.0 ? longest_s * std::pow(shortest_s / longest_s, a)
+                                               : longest_s + (shortest_s - longest_s) * a;
   }
+  // Returns the duration of a blow. If the control follows the pitch, it shrinks in proportion to
+  // the period of a higher key, so that all keys have the same timbre.
+  double pulse_frames() const { return length_s() * rate_hz / pitch; }
+  // Returns the share of a burst's level that remains after one sample.
+  double burst_kept() const { return std::pow(10.0, -3.0 / (length_s() * rate_hz)); }
+  BandNoise noise() const { return {seed, settings.low_hz, settings.high_hz, rate_hz}; }
+  // Scales a lasting force for the same motion at every rate; a position has the same value.
+  double pushed(double value) const { return is_force ? value * rate_ratio * rate_ratio : value; }
   // Scales a speed or an impulse for the same displacement at every rate and pitch.
   double paced(double value) const { return value * rate_ratio * pitch; }
   // Scales the force of a blow, or the displacement that gives the same blow through a spring.

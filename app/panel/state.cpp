@@ -37,7 +37,8 @@ json parameter_json(const ParameterInfo& info, double value) {
 double blow_of(const InputInfo& info, const Preset& preset) {
   double blow = 0.0;
   for (const ControlSetting& control : preset.controls) {
-    if (control.target == "in" + std::to_string(info.number) && control.gesture != Gesture::bow) {
+    if (control.target == "in" + std::to_string(info.number) && control.gesture != Gesture::bow &&
+        control.gesture != Gesture::noise) {
       blow = std::max({blow, std::fabs(control.low), std::fabs(control.high), control.travel});
     }
   }

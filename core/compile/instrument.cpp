@@ -23,13 +23,17 @@ GestureSettings settings_of(const ControlSetting& setting) {
           .high_db = setting.high_db,
           .longest_s = setting.longest_ms / 1e3,
           .shortest_s = setting.shortest_ms / 1e3,
-          .follows_pitch = setting.follows_pitch};
+          .follows_pitch = setting.follows_pitch,
+          .low_hz = setting.low_hz,
+          .high_hz = setting.high_hz,
+          .roughness = setting.noise};
 }
 
 // The setting must fit the network.
 Control make_control(const Network& network, const ControlSetting& setting) {
-  static constexpr Source sources[] = {Source::note, Source::controller, Source::pressure,
-                                       Source::custom, Source::audio};
+  static constexpr Source sources[] = {Source::note,   Source::controller, Source::pressure,
+                                       Source::custom, Source::audio,      Source::release,
+                                       Source::lfo};
   Control control;
   control.source = sources[static_cast<std::size_t>(setting.source)];
   control.gesture = setting.gesture;
@@ -40,6 +44,10 @@ Control make_control(const Network& network, const ControlSetting& setting) {
   control.turn = static_cast<std::uint8_t>(setting.turn - 1);
   control.turns = static_cast<std::uint8_t>(setting.turns);
   control.settings = settings_of(setting);
+  if (control.source == Source::lfo) {
+    control.target = setting.target == "pitch" ? Control::pitch : Control::level;
+    return control;
+  }
   for (const double key : curve_keys(setting)) {
     control.by_key.push_back({key, settings_of(on_key(setting, key))});
   }
@@ -55,6 +63,18 @@ std::vector<Control> make_controls(const Network& network, const Preset& preset)
     controls.push_back(make_control(network, setting));
   }
   return controls;
+}
+
+std::vector<PlayedLfo> make_lfos(const Preset& preset) {
+  std::vector<PlayedLfo> lfos;
+  for (const LfoSetting& setting : preset.lfos) {
+    lfos.push_back(
+        {.lfo = setting.lfo,
+         .is_scaled = setting.by.has_value(),
+         .by = setting.by == ControlSource::controller ? Source::controller : Source::pressure,
+         .number = static_cast<std::uint16_t>(setting.number)});
+  }
+  return lfos;
 }
 
 InputInfo input_info(const Network& network, std::size_t index,
@@ -284,6 +304,8 @@ Playing make_playing(const Network& network, const Preset& preset, const Proof& 
       .home = proof.margins.home,
       .away = keys.away,
       .controls = make_controls(network, preset),
+      .lfos = make_lfos(preset),
+      .variation = {.strength = preset.varied_strength, .timing_s = preset.varied_ms / 1e3},
       .limits = std::move(limits),
       .curves = curves,
       .rest_bounds = proof.rest_bounds};

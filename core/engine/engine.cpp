@@ -12,11 +12,13 @@
 #include "core/engine/energy_watch.h"
 #include "core/engine/gestures.h"
 #include "core/engine/keyboard.h"
+#include "core/engine/lfos.h"
 #include "core/engine/mixing.h"
 #include "core/engine/output_levels.h"
 #include "core/engine/parameters.h"
 #include "core/engine/struck_nodes.h"
 #include "core/engine/takeover.h"
+#include "core/engine/variation.h"
 #include "core/engine/viewer.h"
 
 namespace ressort::engine {
@@ -59,6 +61,8 @@ struct Engine::Player {
                                                        voices.size(), isa, executor, progress)),
         parameters(machine, playing, voices.size()),
         gestures(machine, playing),
+        lfos(playing, machine.rate_hz),
+        variation(playing.variation, machine.rate_hz),
         audio(machine, playing, std::visit([](const auto& b) { return b.mixer.is_silent; }, bank)),
         watch(machine, playing, voices.size()),
         levels(machine, playing),
@@ -80,6 +84,19 @@ struct Engine::Player {
         (is_for_a_channel(event.kind) && !listens_to(channel))) {
       return;
     }
+    if (!variation.delay(event)) {
+      dispatch(event, channel);
+    }
+  }
+
+  // Handles the events that have waited until now.
+  void handle_due() {
+    while (const auto event = variation.take_due()) {
+      dispatch(*event, event->channel % Channels::count);
+    }
+  }
+
+  void dispatch(const Event& event, std::uint8_t channel) {
     follow_tuning_parameter();
     switch (event.kind) {
       case EventKind::note_on:
@@ -118,11 +135,13 @@ struct Engine::Player {
         return std::visit([&](auto& b) { strike(b, event); }, bank);
       case EventKind::panic:
         share.restart();
+        variation.drop(all_channels);
         return keyboard.panic();
     }
   }
 
   void play_controls(Source source, int number, double amount, const Scope& scope) {
+    lfos.scale(source, number, amount, scope, keyboard);
     gestures.play(source, number, amount, scope, keyboard, parameters);
   }
 
@@ -138,7 +157,9 @@ struct Engine::Player {
     if (event.index >= key_count) {
       return;
     }
-    const double velocity = playing.velocity(event.value * keyboard.channels().softness(channel));
+    ++notes;
+    const double velocity =
+        variation.varied(playing.velocity(event.value * keyboard.channels().softness(channel)));
     if (!owns_note(channel, event.index)) {
       gestures.follow_other_engine(event.index, velocity, channel, keyboard, parameters);
       return;
@@ -151,6 +172,7 @@ struct Engine::Player {
     if (press == Press::starts) {
       gestures.reset_drivers(voices[voices.latest()], voices.latest());
     }
+    lfos.restart(voices.latest(), notes, keyboard);
     strike_note(event.index, velocity);
   }
 
@@ -189,8 +211,9 @@ struct Engine::Player {
   void release_voices(IsReleased&& is_released) {
     for (std::size_t lane = 0; lane < voices.size(); ++lane) {
       if (is_released(voices[lane])) {
-        gestures.release(voices[lane], lane);
+        gestures.end(voices[lane], lane);
         keyboard.release(voices[lane]);
+        gestures.play_release(lane, keyboard, parameters);
       }
     }
   }
@@ -231,6 +254,9 @@ struct Engine::Player {
     const std::uint8_t channel = event.channel % Channels::count;
     const ChannelMask reached = reached_by(channel);
     const double modulation = keyboard.channels().modulation(channel);
+    if (event.index == all_sound_off || event.index >= all_notes_off) {
+      variation.drop(reached);
+    }
     if (event.index == all_sound_off) {
       keyboard.silence(channel);
       keyboard.forget_keys(reached);
@@ -391,6 +417,7 @@ struct Engine::Player {
       return;
     }
     voices.advance_glides();
+    lfos.advance(keyboard);
     watch.inspect_next(b, voices, parameters.values());
     for (std::size_t lane = 0; lane < voices.size(); ++lane) {
       Voice& voice = voices[lane];
@@ -453,6 +480,9 @@ struct Engine::Player {
       keyboard.continue_from(from.keyboard);
       parameters.continue_from(from.parameters);
       gestures.continue_from(from.gestures);
+      lfos.continue_from(from.lfos);
+      variation.continue_from(from.variation);
+      notes = from.notes;
       audio.continue_from(from.audio);
       watch.continue_from(from.watch);
       levels.continue_from(from.levels);
@@ -485,12 +515,15 @@ struct Engine::Player {
   AnyBank bank;
   Parameters parameters;
   Gestures gestures;
+  Lfos lfos;
+  NoteVariation variation;
   AudioInputs audio;
   EnergyWatch watch;
   OutputLevels levels;
   Mixing mixing;
   NoteShare share;
   Viewer viewer;
+  std::uint64_t notes = 0;       // note-ons so far, the same in all engines that share them
   std::size_t since_update = 0;  // frames, less than max_block_frames between segments
 };
 
@@ -511,12 +544,18 @@ void Engine::process(std::span<const Event> events, std::span<const double* cons
   std::size_t next = 0;
   std::size_t at = 0;
   while (at < frames) {
+    player_->handle_due();
     while (next < events.size() && events[next].frame <= at) {
       player_->handle(events[next++]);
     }
     const std::size_t until =
         next < events.size() ? std::min<std::size_t>(frames, events[next].frame) : frames;
-    at = player_->play({.inputs = inputs, .outputs = outputs, .at = at, .frames = until - at});
+    const std::size_t before = at;
+    at = player_->play({.inputs = inputs,
+                        .outputs = outputs,
+                        .at = at,
+                        .frames = player_->variation.frames_left(until - at)});
+    player_->variation.advance(at - before);
   }
 }
 

@@ -13,7 +13,8 @@ bool has_turn(const Control& control, std::uint64_t stroke) {
 
 bool matches(const Control& control, Source source, int number) {
   const bool is_in_range = number >= control.lowest_key && number <= control.highest_key;
-  return control.source == source && (source == Source::note         ? is_in_range
+  const bool is_of_key = source == Source::note || source == Source::release;
+  return control.source == source && (is_of_key                      ? is_in_range
                                       : source == Source::controller ? number == control.number
                                                                      : true);
 }
@@ -105,10 +106,17 @@ Stroke Gestures::stroke_on(std::size_t input, Stroke stroke) const {
   return stroke;
 }
 
+// The count of notes is the same in all engines that share them (NoteShare), so their seeds are,
+// too.
+std::uint64_t Gestures::seed_of(const Voice& voice, std::size_t input) const {
+  return strokes_ << 32 | std::uint64_t{voice.is_released} << 31 | std::uint64_t{voice.key} << 24 |
+         input;
+}
+
 void Gestures::play(const GestureRow& gesture, std::size_t input, Stroke stroke, const Scope& scope,
-                    Keyboard& keyboard, Parameters& parameters) {
+                    std::optional<std::size_t> lane, Keyboard& keyboard, Parameters& parameters) {
   const Voices& voices = keyboard.voices;
-  const std::optional<std::size_t> latest = keyboard.latest_of(scope);
+  const std::optional<std::size_t> latest = lane ? lane : keyboard.latest_of(scope);
   const auto first_channel = static_cast<std::uint8_t>(std::countr_zero(scope.channels));
   stroke = stroke_on(input, stroke);
   if (gesture.goal != nullptr) {
@@ -116,11 +124,11 @@ void Gestures::play(const GestureRow& gesture, std::size_t input, Stroke stroke,
     if (scope.key == Scope::every_key) {
       set_starts(scope.channels, input, goal);
     }
-    for (std::size_t lane = 0; lane < voices.size(); ++lane) {
-      const bool is_addressed = keyboard.is_addressed(voices[lane], scope) || lane == latest;
-      if (is_addressed && (voices[lane].awake || !gesture.is_touch)) {
-        wake(keyboard, lane, first_channel);
-        driver(lane, input).follow(goal, stroke.pole_of_position());
+    for (std::size_t one = 0; one < voices.size(); ++one) {
+      const bool is_addressed = keyboard.is_addressed(voices[one], scope) || one == latest;
+      if (is_addressed && (voices[one].awake || !gesture.is_touch)) {
+        wake(keyboard, one, first_channel);
+        driver(one, input).follow(goal, stroke.pole_of_position());
       }
     }
     return;
@@ -132,6 +140,7 @@ void Gestures::play(const GestureRow& gesture, std::size_t input, Stroke stroke,
   Voice& voice = keyboard.voices[*latest];
   set_pitch(*latest, std::sqrt(keyboard.factor_of(voice, parameters.highest_factor())));
   stroke.pitch = stroke.settings.follows_pitch ? pitches_[*latest] : 1.0;
+  stroke.seed = seed_of(voice, input);
   gesture.play(driver(*latest, input), stroke);
   if (stroke.settings.has_level && stroke.amount != 0.0) {
     keyboard.set_strength(voice, stroke.level());
@@ -145,12 +154,12 @@ void Gestures::play(const GestureRow& gesture, std::size_t input, Stroke stroke,
 }
 
 void Gestures::play(const Control& control, double amount, const Scope& scope, Keyboard& keyboard,
-                    Parameters& parameters, double key) {
+                    Parameters& parameters, double key, std::optional<std::size_t> lane) {
   const Stroke stroke = stroke_of(control, amount, key);
   if (control.gesture == Gesture::parameter) {
     return parameters.set(control.target, stroke.mapped());
   }
-  play(row_of(control.gesture), control.target, stroke, scope, keyboard, parameters);
+  play(row_of(control.gesture), control.target, stroke, scope, lane, keyboard, parameters);
 }
 
 void Gestures::play(Source source, int number, double amount, const Scope& scope,
@@ -193,7 +202,7 @@ void Gestures::play_live(const Event& event, Keyboard& keyboard, Parameters& par
     stroke.is_live = true;
     stroke.amount = event.value;
     stroke.second = event.value2;
-    play(gesture, input, stroke, Scope{}, keyboard, parameters);
+    play(gesture, input, stroke, Scope{}, std::nullopt, keyboard, parameters);
   };
   const std::vector<Control>& controls = playing_.controls;
   if (gesture.live == Live::by_preset) {
@@ -215,12 +224,22 @@ void Gestures::play_live(const Event& event, Keyboard& keyboard, Parameters& par
   }
 }
 
-void Gestures::release(const Voice& voice, std::size_t lane) {
+void Gestures::end(const Voice& voice, std::size_t lane) {
   for (const Control& control : playing_.controls) {
     const auto release = row_of(control.gesture).release;
     if (release != nullptr && matches(control, Source::note, voice.key)) {
       release(driver(lane, control.target),
               stroke_on(control.target, stroke_of(control, 1.0, voice.key)));
+    }
+  }
+}
+
+void Gestures::play_release(std::size_t lane, Keyboard& keyboard, Parameters& parameters) {
+  const Voice& voice = keyboard.voices[lane];
+  const Scope scope{.channels = channel_bit(voice.channel), .key = voice.key};
+  for (const Control& control : playing_.controls) {
+    if (matches(control, Source::release, voice.key)) {
+      play(control, voice.release_velocity, scope, keyboard, parameters, voice.key, lane);
     }
   }
 }

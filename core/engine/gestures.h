@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -38,12 +39,14 @@ class Gestures {
   }
 
   // Plays all controls of this source that match the key or the controller number, with an amount
-  // 0..1. A gesture with a goal moves in all voices of the scope, any other in the latest of them.
+  // 0..1. A gesture with a goal moves in all voices of the scope, any other in `lane`, by default
+  // the latest of them.
   // Parameters change for all voices. O(controls * voices)
   void play(Source source, int number, double amount, const Scope& scope, Keyboard& keyboard,
             Parameters& parameters);
   void play(const Control& control, double amount, const Scope& scope, Keyboard& keyboard,
-            Parameters& parameters, double key = middle_c);
+            Parameters& parameters, double key = middle_c,
+            std::optional<std::size_t> lane = std::nullopt);
   // Follows a note that another engine plays (NoteShare). Gestures that move all voices are played;
   // of the others only the position is kept at which the next one starts.
   void follow_other_engine(int key, double amount, std::uint8_t channel, Keyboard& keyboard,
@@ -51,7 +54,9 @@ class Gestures {
   // Handles EventKind::gesture.
   void play_live(const Event& event, Keyboard& keyboard, Parameters& parameters);
   // Ends the gestures of a voice's key when it is released.
-  void release(const Voice& voice, std::size_t lane);
+  void end(const Voice& voice, std::size_t lane);
+  // Plays the release controls of a voice's key, with its release velocity.
+  void play_release(std::size_t lane, Keyboard& keyboard, Parameters& parameters);
   // Adapts the speed of bows to the new pitch of retuned voices. In units of the string's motion
   // the speed stays the same, so that a bent or gliding bow keeps its grip.
   void follow_pitch_changes(const Voices& voices);
@@ -81,7 +86,8 @@ class Gestures {
   }
   Stroke stroke_on(std::size_t input, Stroke stroke) const;
   void play(const GestureRow& gesture, std::size_t input, Stroke stroke, const Scope& scope,
-            Keyboard& keyboard, Parameters& parameters);
+            std::optional<std::size_t> lane, Keyboard& keyboard, Parameters& parameters);
+  std::uint64_t seed_of(const Voice& voice, std::size_t input) const;
   void set_pitch(std::size_t lane, double pitch);
   void set_starts(ChannelMask channels, std::size_t input, double start);
   template <class T>

@@ -200,6 +200,7 @@ bool Keyboard::release_key(Voice& voice, int key, std::uint8_t channel, double v
   }
   voice.held = false;
   voice.is_released = true;
+  voice.release_velocity = velocity;
   voice.release_s =
       playing_.damper_on(voice.key) *
       std::pow(release_range, 2.0 * (usual_release_velocity - velocity));
@@ -324,7 +325,7 @@ bool Keyboard::is_released_by_pedal(const Voice& voice, std::uint8_t channel) co
 }
 
 SideGains Keyboard::level_of(const Voice& voice) const {
-  double level = channels_.level(voice.channel);
+  double level = channels_.level(voice.channel) * voice.tremolo;
   if (voice.has_key && !playing_.keys_db.empty()) {
     level *= std::pow(10.0, value_at(playing_.keys_db, voice.key) / 20.0);
   }
@@ -337,6 +338,21 @@ void Keyboard::set_velocity(Voice& voice, double velocity) {
   voice.velocity = highest * velocity;
   if (!playing_.curves.empty()) {
     voices.mark_retuned(voice);
+  }
+}
+
+void Keyboard::vibrate(Voice& voice, double semitones, double gain) {
+  if (voice.vibrato != semitones) {
+    voice.vibrato = semitones;
+    voices.mark_retuned(voice);
+  }
+  if (voice.tremolo != gain) {
+    voice.tremolo = gain;
+    if (voice.is_new) {
+      set_strength(voice, voice.strength);
+    } else {
+      voices.follow_volume(voice, level_of(voice));
+    }
   }
 }
 

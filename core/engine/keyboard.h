@@ -108,6 +108,8 @@ class Keyboard {
   const Channels& channels() const { return channels_; }
   // Sets the velocity of a voice's strike, 0..1, for the curves of its parameters.
   void set_velocity(Voice& voice, double velocity);
+  // Sets the pitch and the gain that LFOs add to a voice.
+  void vibrate(Voice& voice, double semitones, double gain);
   // Sets a voice's gain by velocity: at once if it starts, else within 20 ms.
   void set_strength(Voice& voice, double strength) const;
 

@@ -14,15 +14,18 @@
 #include "core/engine/midi/note_share.h"
 #include "core/engine/pitches.h"
 #include "core/gesture.h"
+#include "core/lfo.h"
 
 namespace ressort::engine {
 
-enum class Source : std::uint8_t { note, controller, pressure, custom, audio };
+enum class Source : std::uint8_t { note, controller, pressure, custom, audio, release, lfo };
 
 // One row of the control map: a source drives an input or a parameter by a gesture.
 struct Control {
   Source source = Source::note;
-  std::uint16_t number = 0;  // controller 0..127, or audio channel from 0
+  static constexpr std::uint16_t pitch = 0;  // targets of an LFO
+  static constexpr std::uint16_t level = 1;
+  std::uint16_t number = 0;  // controller 0..127, audio channel from 0, or index of the LFO
   std::uint8_t lowest_key = 0;
   std::uint8_t highest_key = 127;
   std::uint8_t turn = 0;   // position in a round robin of notes, from 0
@@ -36,6 +39,19 @@ struct Control {
   GestureSettings settings_on(double key) const {
     return by_key.empty() ? settings : settings_at(by_key, key);
   }
+};
+
+struct PlayedLfo {
+  Lfo lfo;
+  bool is_scaled = false;  // a controller or the pressure scales its depth
+  Source by = Source::pressure;
+  std::uint16_t number = 0;  // controller
+};
+
+// Greatest random differences from note to note.
+struct Variation {
+  double strength = 0.0;  // relative
+  double timing_s = 0.0;  // notes start up to this late
 };
 
 enum class Tuning : std::uint8_t {
@@ -102,6 +118,8 @@ struct Playing {
   std::vector<Limits> home;     // [parameter] range in which highest_factor holds; empty: anywhere
   std::vector<double> away;     // highest_factor at equal steps from `home` to `limits`
   std::vector<Control> controls;
+  std::vector<PlayedLfo> lfos;
+  Variation variation;
   std::vector<Limits> limits;  // [parameter] hard limits for events and audio; empty: none
   // [parameter] the curve of a parameter whose value differs from voice to voice; empty: none does
   std::vector<std::optional<VoiceCurve>> curves;

@@ -61,8 +61,9 @@ class VoiceTuning {
   }
   // Returns the voice's factor on every stiffness, with bend and glide.
   double factor_for(const Voice& voice, const Channels& channels, double highest_factor) const {
-    const double bent =
-        std::exp2((voice.semitones + channels.zone_semitones(voice.channel) + voice.glide) / 12.0);
+    const double bent = std::exp2(
+        (voice.semitones + channels.zone_semitones(voice.channel) + voice.glide + voice.vibrato) /
+        12.0);
     const double factor = voice.frequency_hz > 0.0
                               ? factor_at(key_of(voice), voice.frequency_hz * bent)
                               : bent * bent;

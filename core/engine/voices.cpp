@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "core/engine/event.h"
 #include "core/kernels/kernel.h"
 
 namespace ressort::engine {
@@ -59,7 +60,8 @@ void Voices::start(std::size_t lane, double frequency_hz, double semitones) {
                    .level = 1.0,  // not heard yet, so not yet the quietest
                    .frequency_hz = frequency_hz,
                    .semitones = semitones,
-                   .release_s = playing_.damper_on(middle_c)};
+                   .release_s = playing_.damper_on(middle_c),
+                   .release_velocity = usual_release_velocity};
   has_changed_ = true;
   latest_ = lane;
 }
@@ -144,7 +146,14 @@ void Voices::damp(Voice& voice, double share, double extra_per_s) const {
 }
 
 void Voices::ramp_volume(Voice& voice, const SideGains& level) const {
-  const auto frames = static_cast<std::size_t>(std::max(1.0, volume_ramp_s * rate_hz_));
+  ramp_volume(voice, level, static_cast<std::size_t>(std::max(1.0, volume_ramp_s * rate_hz_)));
+}
+
+void Voices::follow_volume(Voice& voice, const SideGains& level) const {
+  ramp_volume(voice, level, std::max(max_block_frames, voice.volume_frames));
+}
+
+void Voices::ramp_volume(Voice& voice, const SideGains& level, std::size_t frames) {
   for (std::size_t side = 0; side < level.size(); ++side) {
     voice.volume_step[side] =
         (voice.strength * level[side] - voice.volume[side]) / static_cast<double>(frames);

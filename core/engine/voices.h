@@ -81,10 +81,13 @@ struct alignas(64) Voice {
   double frequency_hz = 0.0;  // without bend; 0: as the model is written
   double key_hz = 0.0;        // requested frequency, before the stability limit
   double semitones = 0.0;     // its own channel's bend and tuning
+  double vibrato = 0.0;       // semitones by LFOs
+  double tremolo = 1.0;       // gain by LFOs
   double glide = 0.0;         // semitones left of the glide
   double glide_step = 0.0;    // semitones per max_block_frames
   double factor = 1.0;        // factor on every stiffness
   double release_s = 0.0;     // T60 of its damper, by release velocity
+  double release_velocity = 0.0;  // 0..1
   double velocity = 0.0;      // of its last strike, 0..127, after the velocity curve
 };
 
@@ -149,6 +152,8 @@ class Voices {
   void damp(Voice& voice, double share, double extra_per_s) const;
   // Ramps the volume to strength * `level` within 20 ms.
   void ramp_volume(Voice& voice, const SideGains& level) const;
+  // Ramps it within one block, or to the end of the current ramp.
+  void follow_volume(Voice& voice, const SideGains& level) const;
   // Fades the voice out within 5 ms, as a stolen voice.
   void fade(Voice& voice) const;
   void limit(std::size_t most);
@@ -176,6 +181,7 @@ class Voices {
 
  private:
   void free(Voice& voice);
+  static void ramp_volume(Voice& voice, const SideGains& level, std::size_t frames);
   std::size_t count_excess(std::size_t more) const;
 
   const Playing& playing_;

@@ -178,7 +178,7 @@ void strike_first_mass(ChartScene& scene) {
 
 void play_note(ChartScene& scene, const Preset& preset) {
   for (const ControlSetting& control : preset.controls) {
-    if (control.source != ControlSource::note) {
+    if (control.source != ControlSource::note || control.gesture == Gesture::noise) {
       continue;
     }
     for (std::size_t i = 0; i < scene.network.inputs.size(); ++i) {

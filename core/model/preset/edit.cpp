@@ -16,9 +16,12 @@ std::string source_name(const ControlSetting& control) {
     case ControlSource::pressure:
       return "pressure";
     case ControlSource::osc:
+    case ControlSource::lfo:
       return control.address;
     case ControlSource::audio:
       return "audio" + std::to_string(control.number);
+    case ControlSource::release:
+      return "release";
   }
   return "";
 }
@@ -64,6 +67,10 @@ std::string print_control(const ControlSetting& control) {
     text += "length_ms = " + pair(control.longest_ms, control.shortest_ms) + "\n";
   }
   text += control.follows_pitch ? "" : "follows_pitch = false\n";
+  text += control.noise != usual.noise ? "noise = " + in_toml(control.noise) + "\n" : "";
+  if (control.low_hz != usual.low_hz || control.high_hz != usual.high_hz) {
+    text += "band_hz = " + pair(control.low_hz, control.high_hz) + "\n";
+  }
   if (control.lowest_key != usual.lowest_key || control.highest_key != usual.highest_key) {
     text += "keys = [" + std::to_string(control.lowest_key) + ", " +
             std::to_string(control.highest_key) + "]\n";

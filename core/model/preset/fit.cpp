@@ -21,6 +21,9 @@ std::string names(const Network& network) {
 
 // Returns an error message for the control, or "".
 std::string misfit(const Network& network, const ControlSetting& control) {
+  if (control.source == ControlSource::lfo) {
+    return "";  // it moves the pitch or the level of every model
+  }
   if (control.gesture == Gesture::parameter) {
     return find_parameter(network, control.target) < 0 ? no_parameter(network, control.target)
            : control.source == ControlSource::audio

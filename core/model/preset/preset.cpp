@@ -370,6 +370,8 @@ bool read_source(std::string_view text, ControlSetting& control) {
   };
   if (text == "note") {
     control.source = ControlSource::note;
+  } else if (text == "release") {
+    control.source = ControlSource::release;
   } else if (text == "pressure") {
     control.source = ControlSource::pressure;
   } else if (numbered("cc", 0, 119)) {
@@ -383,6 +385,77 @@ bool read_source(std::string_view text, ControlSetting& control) {
     return false;
   }
   return true;
+}
+
+// Reads the name of an LFO.
+bool read_lfo_source(std::string_view text, const Preset& preset, ControlSetting& control) {
+  for (std::size_t i = 0; i < preset.lfos.size(); ++i) {
+    if (preset.lfos[i].name == text) {
+      control.source = ControlSource::lfo;
+      control.number = static_cast<int>(i);
+      control.address = preset.lfos[i].name;
+      return true;
+    }
+  }
+  return false;
+}
+
+void read_lfo(const toml::table& table, Preset& preset, std::vector<Error>& errors) {
+  TomlTable reader(table, "an LFO", errors);
+  reader.allow("lfo");
+  LfoSetting setting;
+  Lfo& lfo = setting.lfo;
+  ControlSetting source;
+  if ((reader.text("name", setting.name) || table.get("name") == nullptr) &&
+      (!is_identifier(setting.name) || read_source(setting.name, source) ||
+       read_lfo_source(setting.name, preset, source))) {
+    const toml::node* const node = table.get("name");
+    reader.fail(node != nullptr ? *node : table,
+                "an LFO needs a name of its own, of letters and digits: name = \"vibrato\"");
+  }
+  reader.number("rate_hz", lfo.rate_hz, 0.01, 50.0);
+  reader.number("delay_s", lfo.delay_s, 0.0, 60.0);
+  reader.number("fade_s", lfo.fade_s, 0.0, 60.0);
+  reader.number("depth", lfo.depth, 0.0, 1.0);
+  reader.number("deviation", lfo.deviation, 0.0, 1.0);
+  if (std::string shape; reader.text("shape", shape)) {
+    lfo.shape = shape == "triangle" ? LfoShape::triangle
+                : shape == "random" ? LfoShape::random
+                                    : LfoShape::sine;
+    if (lfo.shape == LfoShape::sine && shape != "sine") {
+      reader.fail(*table.get("shape"), "'shape' must be sine, triangle or random");
+    }
+  }
+  if (std::string by; reader.text("by", by)) {
+    ControlSetting scaled;
+    if (read_source(by, scaled) &&
+        (scaled.source == ControlSource::controller || scaled.source == ControlSource::pressure)) {
+      setting.by = scaled.source;
+      setting.number = scaled.number;
+    } else {
+      reader.fail(*table.get("by"), "'by' must be \"pressure\", or \"cc0\" to \"cc119\"");
+    }
+  }
+  preset.lfos.push_back(std::move(setting));
+}
+
+// Checks the control of an LFO, which has no gesture.
+void check_lfo_control(const toml::table& table, const ControlSetting& control, TomlTable& reader) {
+  if (control.target != "pitch" && control.target != "level") {
+    reader.fail(table,
+                "an LFO moves \"pitch\" (in cents) or \"level\" (in dB); set 'to' to one of "
+                "them");
+  }
+  if (table.get("range") == nullptr) {
+    reader.fail(table, "the control of an LFO needs 'range': cents or dB, range = [-10, 10]");
+  }
+  for (const auto& [key, node] : table) {
+    if (key.str() != "from" && key.str() != "to" && key.str() != "range") {
+      reader.fail(node, quoted(key.str()) +
+                            " has no effect on an LFO; it has 'from', 'to' and "
+                            "'range'");
+    }
+  }
 }
 
 // Returns the gesture of a control without `how`: it moves an input or sets a parameter.
@@ -479,11 +552,13 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
   reader.allow("control");
   ControlSetting control{.location = location_of(table)};
   std::string from;
-  if ((reader.text("from", from) || table.get("from") == nullptr) && !read_source(from, control)) {
+  if ((reader.text("from", from) || table.get("from") == nullptr) && !read_source(from, control) &&
+      !read_lfo_source(from, preset, control)) {
     const toml::node* node = table.get("from");
-    reader.fail(node != nullptr ? *node : table,
-                "'from' must be \"note\", \"pressure\", \"cc0\" to \"cc119\", \"audio1\", "
-                "or an OSC name such as \"/finger\"");
+    reader.fail(
+        node != nullptr ? *node : table,
+        "'from' must be \"note\", \"release\", \"pressure\", \"cc0\" to \"cc119\", \"audio1\", "
+        "an OSC name such as \"/finger\", or the name of an [[lfo]]");
   }
   if (control.source == ControlSource::osc && !is_address(control.address)) {
     reader.fail(*table.get("from"),
@@ -498,7 +573,8 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
   if ((reader.text("to", control.target) || table.get("to") == nullptr) && control.target.empty()) {
     reader.fail(table, "a control needs 'to': an input such as \"in1\" or a parameter");
   }
-  control.gesture = usual_gesture(control.target);
+  control.gesture =
+      control.source == ControlSource::lfo ? Gesture::parameter : usual_gesture(control.target);
   if (std::string how; reader.text("how", how)) {
     const auto* row = std::find_if(
         std::begin(gestures), std::end(gestures),
@@ -536,11 +612,37 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
   if (control.has_level && control.gesture == Gesture::parameter) {
     reader.fail(*table.get("level_db"), "'level_db' is for controls of inputs, not of parameters");
   }
+  if (control.has_level && control.source == ControlSource::release) {
+    reader.fail(*table.get("level_db"),
+                "'level_db' would change the gain of the note that is released; set 'range'");
+  }
+  const bool is_noise = control.gesture == Gesture::noise;
+  const double longest_ms = is_noise ? 1e4 : 1e3;
   if (pair_or_keys({"length_ms", "[[21, 5, 4], [108, 1.1, 0.6]]", "[key, longest, shortest]", 0.0,
-                    1e3, "a key lies between 0 and 127, its lengths between 0 and 1000 ms"},
+                    longest_ms,
+                    is_noise ? "a key lies between 0 and 127, its lengths between 0 and 10000 ms"
+                             : "a key lies between 0 and 127, its lengths between 0 and 1000 ms"},
                    control.length_keys, control.longest_ms, control.shortest_ms) &&
-      control.gesture != Gesture::impulse && control.gesture != Gesture::swing) {
-    reader.fail(*table.get("length_ms"), "'length_ms' is for impulses and swings only");
+      control.gesture != Gesture::impulse && control.gesture != Gesture::swing && !is_noise) {
+    reader.fail(*table.get("length_ms"), "'length_ms' is for impulses, swings and noise only");
+  }
+  const bool has_lengths =
+      control.longest_ms > 0.0 && control.shortest_ms > 0.0 &&
+      std::all_of(control.length_keys.begin(), control.length_keys.end(),
+                  [](const KeyPair& point) { return point[1] > 0.0 && point[2] > 0.0; });
+  if (is_noise && !has_lengths) {
+    reader.fail(table,
+                "noise needs 'length_ms' above 0: the T60 of the softest and the hardest "
+                "burst, length_ms = [60, 40]");
+  }
+  if (reader.number("noise", control.noise, 0.0, 1.0) && control.gesture != Gesture::bow) {
+    reader.fail(*table.get("noise"),
+                "'noise' is the noise of a bow; use how = \"noise\" for a "
+                "burst of noise");
+  }
+  if (reader.range("band_hz", control.low_hz, control.high_hz, 1.0, 1e5) && !is_noise &&
+      control.noise == 0.0) {
+    reader.fail(*table.get("band_hz"), "'band_hz' is for noise, and for a bow with 'noise', only");
   }
   constexpr Gesture scaled[] = {Gesture::pluck, Gesture::bow, Gesture::impulse, Gesture::swing};
   if (reader.flag("follows_pitch", control.follows_pitch) &&
@@ -576,6 +678,9 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
                   [&](const KeyPair& point) { return point[1] * point[2] > 0.0; });
   if (control.exponential && (has_range || table.get("range") == nullptr) && !is_one_sided) {
     reader.fail(table, "an exponential curve needs a range on one side of 0");
+  }
+  if (control.source == ControlSource::lfo) {
+    check_lfo_control(table, control, reader);
   }
   const GestureRow& gesture = row_of(control.gesture);
   if (!gesture.needs_travel.empty() && (has_travel || table.get("travel") == nullptr) &&
@@ -869,6 +974,26 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
   }
   if (const toml::node* node = root.get("morph")) {
     read_morph(*node, preset, errors);
+  }
+  if (const toml::node* node = root.get("variation")) {
+    if (const toml::table* table = node->as_table()) {
+      TomlTable variation(*table, "the variation", errors);
+      variation.allow("variation");
+      variation.number("strength", preset.varied_strength, 0.0, 1.0);
+      variation.number("timing_ms", preset.varied_ms, 0.0, 50.0);
+    } else {
+      reader.fail(*node, "'variation' must be a table: { strength = 0.05, timing_ms = 5 }");
+    }
+  }
+  if (const toml::node* node = root.get("lfo")) {
+    const toml::array* rows = node->as_array();
+    if (rows == nullptr || !rows->is_homogeneous<toml::table>() || rows->size() > most_lfos) {
+      reader.fail(*node, "write each LFO as a table of its own, up to 8: [[lfo]]");
+    } else {
+      for (const toml::node& row : *rows) {
+        read_lfo(*row.as_table(), preset, errors);
+      }
+    }
   }
   if (const toml::node* node = root.get("control")) {
     const toml::array* rows = node->as_array();

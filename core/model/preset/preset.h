@@ -12,6 +12,7 @@
 
 #include "core/curve.h"
 #include "core/gesture.h"
+#include "core/lfo.h"
 #include "core/model/network.h"
 #include "core/model/preset/budget.h"
 #include "core/result.h"
@@ -34,16 +35,16 @@ struct ParameterSetting {
   bool operator==(const ParameterSetting&) const = default;
 };
 
-enum class ControlSource { note, controller, pressure, osc, audio };
+enum class ControlSource { note, controller, pressure, osc, audio, release, lfo };
 
 // A key and two numbers, such as the low and the high end of a range.
 using KeyPair = std::array<double, 3>;
 
 struct ControlSetting {
   ControlSource source = ControlSource::note;
-  int number = 0;       // number of the controller (0..127) or the audio channel (from 1)
-  std::string address;  // OSC name, such as "/finger"
-  std::string target;   // "in1" or a parameter's name
+  int number = 0;       // controller (0..127), audio channel (from 1), or index of the LFO
+  std::string address;  // OSC name, such as "/finger", or the name of the LFO
+  std::string target;   // "in1" or a parameter's name; for an LFO "pitch" or "level"
   Gesture gesture = Gesture::position;
   double low = 0.0;   // values for 0 and 1 of the source: a position, a force, a velocity in
   double high = 1.0;  //   units per sample at 44 100 Hz, or a parameter's value
@@ -55,8 +56,12 @@ struct ControlSetting {
   bool has_level = false;  // 0 and 1 of the source also set the level of the voice
   double low_db = 0.0;
   double high_db = 0.0;
-  double longest_ms = 0.0;  // duration of an impulse for 0 and for 1; 0: one sample
+  // Duration of an impulse for 0 and for 1, 0 is one sample; T60 of noise.
+  double longest_ms = 0.0;
   double shortest_ms = 0.0;
+  double low_hz = 20.0;  // band of noise
+  double high_hz = 20000.0;
+  double noise = 0.0;  // rms of the fluctuation of a bow's speed, as a share of the speed
   // The same numbers by key, ascending; empty: on all keys alike. The numbers above are then those
   // of middle C. The third number of `travel_keys` is not used.
   std::vector<KeyPair> range_keys = {};
@@ -76,6 +81,13 @@ struct ControlSetting {
 // numbers of one key. [any thread but audio]
 std::vector<double> curve_keys(const ControlSetting& control);
 ControlSetting on_key(ControlSetting control, double key);
+struct LfoSetting {
+  std::string name;
+  Lfo lfo;
+  std::optional<ControlSource> by;  // controller or pressure that scales the depth
+  int number = 0;                   // of the controller
+  bool operator==(const LfoSetting&) const = default;
+};
 
 // A stop of a morph: a preset, or values of the model's parameters.
 struct MorphSetting {
@@ -122,7 +134,10 @@ struct Preset {
   std::optional<ThirdArgument> third;       // meaning of the state argument; overrides the model
   Budget budget;                            // error budget
   std::vector<ParameterSetting> parameters;
+  std::vector<LfoSetting> lfos;
   std::vector<ControlSetting> controls;
+  double varied_strength = 0.0;     // greatest relative difference of strength from note to note
+  double varied_ms = 0.0;           // greatest delay of a note
   std::string morph_parameter;      // goes from 1 to the number of stops
   std::vector<MorphSetting> morph;  // empty: no morph
   bool operator==(const Preset&) const = default;
@@ -130,6 +145,7 @@ struct Preset {
 
 inline constexpr int max_voices = 256;
 inline constexpr std::size_t most_morph_stops = 16;
+inline constexpr std::size_t most_lfos = 8;
 inline constexpr int most_pitch_mode = 16;
 inline constexpr std::size_t max_preset_bytes = std::size_t{64} << 10;
 inline constexpr std::size_t most_preset_errors = 100;

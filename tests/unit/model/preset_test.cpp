@@ -191,6 +191,37 @@ TEST_CASE("all sources and gestures are read", "[preset]") {
   CHECK(control_of("from = \"cc1\"\nto = \"inner\"").gesture == Gesture::parameter);
 }
 
+TEST_CASE("noise, releases, LFOs and variation are read", "[preset]") {
+  const ControlSetting noise = control_of(
+      "from = \"release\"\nto = \"in1\"\nhow = \"noise\"\nlength_ms = [60, 2000]\n"
+      "band_hz = [80, 1500]");
+  CHECK(noise.source == ControlSource::release);
+  CHECK(noise.gesture == Gesture::noise);
+  CHECK(noise.shortest_ms == 2000.0);
+  CHECK(noise.low_hz == 80.0);
+  CHECK(noise.high_hz == 1500.0);
+  CHECK(control_of("from = \"note\"\nto = \"in1\"\nhow = \"bow\"\nnoise = 0.05").noise == 0.05);
+  const auto read = parse_preset(
+      "model = \"x.mdl\"\nvariation = { strength = 0.05, timing_ms = 5 }\n"
+      "[[lfo]]\nname = \"slow\"\n[[lfo]]\nname = \"vibrato\"\nrate_hz = 6\ndelay_s = 0.2\n"
+      "fade_s = 0.4\nshape = \"random\"\ndepth = 0.5\ndeviation = 0.1\nby = \"cc1\"\n"
+      "[[control]]\nfrom = \"vibrato\"\nto = \"pitch\"\nrange = [-10, 10]\n");
+  REQUIRE(read.ok());
+  CHECK(read.preset.varied_strength == 0.05);
+  CHECK(read.preset.varied_ms == 5.0);
+  CHECK(read.preset.lfos[1] == LfoSetting{.name = "vibrato",
+                                          .lfo = {.rate_hz = 6.0,
+                                                  .delay_s = 0.2,
+                                                  .fade_s = 0.4,
+                                                  .shape = LfoShape::random,
+                                                  .depth = 0.5,
+                                                  .deviation = 0.1},
+                                          .by = ControlSource::controller,
+                                          .number = 1});
+  CHECK(read.preset.controls[0].source == ControlSource::lfo);
+  CHECK(read.preset.controls[0].number == 1);
+}
+
 TEST_CASE("reserved OSC addresses are rejected", "[preset]") {
   for (const Row* const row : addresses()) {
     std::string address = row->address;
@@ -293,8 +324,8 @@ TEST_CASE("errors in presets have a line and a column", "[preset]") {
       {m + "tuning = \"fixed\"\n[parameters]\nK = { value = 1, range = [1, 2], "
            "keys = [[21, 1], [60, 2]] }",
        4, 41, "'keys' has no effect with tuning = \"fixed\""},
-      {m + "[[control]]\nfrom = \"cc1\"\n" + to + "range = { keys = [[21, 0, 1], [60, 0, 2]] }",
-       5, 9, "'range' can differ from key to key only for notes"},
+      {m + "[[control]]\nfrom = \"cc1\"\n" + to + "range = { keys = [[21, 0, 1], [60, 0, 2]] }", 5,
+       9, "'range' can differ from key to key only for notes"},
       {m + "[[control]]\nfrom = \"note\"\n" + to + "range = { keys = [[21, 0], [60, 0]] }", 5, 19,
        "a point of 'range' is three numbers: [key, low, high]"},
       {m + "[[control]]\nfrom = \"note\"\n" + to + "range = { low = 1 }", 5, 9,
@@ -330,7 +361,7 @@ TEST_CASE("errors in presets have a line and a column", "[preset]") {
       {"model = \"/etc/passwd\"", 1, 9, "'model' must be the name of a .mdl file"},
       {with_control("from = \"note\""), 2, 1, "a control needs 'to'"},
       {with_control(to + "from = \"note\"\nhow = \"slap\""), 5, 7,
-       "'how' must be position, pluck, bow, impulse, swing, hold, touch or parameter"},
+       "'how' must be position, pluck, bow, impulse, swing, hold, touch, noise or parameter"},
       {with_control(to + "from = \"note\"\nhow = \"pluck\""), 2, 1, "a pluck needs 'travel'"},
       {with_control(to + "from = \"note\"\ncurve = \"round\""), 5, 9,
        "'curve' must be linear or exponential"},
@@ -341,6 +372,23 @@ TEST_CASE("errors in presets have a line and a column", "[preset]") {
        "'keys' is the wrong way round"},
       {with_control(to + "from = \"note\"\nkeys = [60, 128]"), 5, 13,
        "'keys' must lie between 0 and 127"},
+      {with_control(to + "from = \"note\"\nhow = \"noise\""), 2, 1,
+       "noise needs 'length_ms' above 0"},
+      {with_control(to + "from = \"note\"\nband_hz = [20, 30]"), 5, 11, "'band_hz' is for noise"},
+      {with_control(to + "from = \"note\"\nnoise = 0.1"), 5, 9, "'noise' is the noise of a bow"},
+      {with_control(to + "from = \"release\"\nhow = \"impulse\"\nlevel_db = [-20, 0]"), 6, 12,
+       "'level_db' would change the gain of the note that is released"},
+      {m + "variation = 1", 2, 13, "'variation' must be a table"},
+      {m + "variation = { place = 1 }", 2, 23,
+       "unknown key 'place' in the variation; there are strength, timing_ms"},
+      {m + "[[lfo]]\nrate_hz = 5", 2, 1, "an LFO needs a name of its own"},
+      {m + "[[lfo]]\nname = \"cc1\"", 3, 8, "an LFO needs a name of its own"},
+      {m + "[[lfo]]\nname = \"v\"\nshape = \"saw\"", 4, 9, "'shape' must be sine, triangle"},
+      {m + "[[lfo]]\nname = \"v\"\nby = \"note\"", 4, 6, "'by' must be \"pressure\", or"},
+      {m + "[[lfo]]\nname = \"v\"\n[[control]]\nfrom = \"v\"\nto = \"in1\"\nrange = [0, 1]", 4, 1,
+       "an LFO moves \"pitch\" (in cents) or \"level\" (in dB)"},
+      {m + "[[lfo]]\nname = \"v\"\n[[control]]\nfrom = \"v\"\nto = \"pitch\"", 4, 1,
+       "the control of an LFO needs 'range'"},
   };
   for (const Complaint& complaint : complaints) {
     check_error(complaint);

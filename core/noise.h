@@ -1,0 +1,72 @@
+// core: seeded noise. The same seed gives the same noise, so renders repeat.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+
+namespace ressort {
+
+// Uniform numbers in -1..1 by xorshift64 (Marsaglia 2003). Any seed is valid: it is mixed by
+// splitmix64 (Steele, Lea and Flood 2014). [audio] wait-free
+class RandomNumbers {
+ public:
+  explicit RandomNumbers(std::uint64_t seed = 0) {
+    seed += 0x9e3779b97f4a7c15u;
+    seed = (seed ^ (seed >> 30)) * 0xbf58476d1ce4e5b9u;
+    seed = (seed ^ (seed >> 27)) * 0x94d049bb133111ebu;
+    state_ = std::max<std::uint64_t>(1, seed ^ (seed >> 31));
+  }
+  double next() {
+    state_ ^= state_ << 13;
+    state_ ^= state_ >> 7;
+    state_ ^= state_ << 17;
+    return static_cast<double>(static_cast<std::int64_t>(state_)) * 0x1p-63;
+  }
+
+ private:
+  std::uint64_t state_;
+};
+
+// White noise through a one-pole highpass and a one-pole lowpass by the bilinear transform, so that
+// both are at -3 dB at exactly their frequencies at any sample rate. Its rms is 1: the variance of
+// (1 - z^-2) / ((1 - a z^-1)(1 - b z^-1)) is 2 / (1 - a b). [audio] wait-free
+class BandNoise {
+ public:
+  BandNoise() = default;
+  BandNoise(std::uint64_t seed, double low_hz, double high_hz, double rate_hz) : white_(seed) {
+    const auto pole_at = [&](double hz) {
+      constexpr double highest = 0.45;  // of the sample rate
+      const double t = std::tan(std::numbers::pi * std::min(hz / rate_hz, highest));
+      return (1.0 - t) / (1.0 + t);
+    };
+    const double a = pole_at(low_hz);
+    const double b = pole_at(high_hz);
+    sum_ = a + b;
+    product_ = a * b;
+    constexpr double variance_of_white = 1.0 / 3.0;
+    gain_ = std::sqrt(0.5 * (1.0 - product_) / variance_of_white);
+  }
+  double next() {
+    const double x = white_.next();
+    const double y = gain_ * (x - x2_) + sum_ * y1_ - product_ * y2_;
+    x2_ = x1_;
+    x1_ = x;
+    y2_ = y1_;
+    y1_ = y;
+    return y;
+  }
+
+ private:
+  RandomNumbers white_;
+  double gain_ = 0.0;
+  double sum_ = 0.0;      // of both poles
+  double product_ = 0.0;  // of both poles
+  double x1_ = 0.0;
+  double x2_ = 0.0;
+  double y1_ = 0.0;
+  double y2_ = 0.0;
+};
+
+}  // namespace ressort

@@ -1,0 +1,202 @@
+// LFOs and small differences from note to note, measured on the engine's output.
+#include "tests/support/player.h"
+
+namespace ressort::lfo_test {
+namespace {
+
+using namespace support;
+
+// One mode, which loses 0.4 dB per second.
+const std::string tone =
+    "@g ground 0.\n@m mass 1. 0. 0.\n@k springDamper @g @m 0.004 0.000002\n@in1 frcInput @m\n"
+    "@out1 posOutput @m\n";
+
+Preset moved(const LfoSetting& lfo, const std::string& target, double low, double high) {
+  Preset preset = struck(4);
+  preset.lfos = {lfo};
+  preset.controls.push_back({.source = ControlSource::lfo,
+                             .address = lfo.name,
+                             .target = target,
+                             .gesture = Gesture::parameter,
+                             .low = low,
+                             .high = high});
+  return preset;
+}
+
+struct Reading {
+  double time_s;
+  double value;
+};
+
+// Cents above 440 Hz in each period, from the zero crossings.
+std::vector<Reading> cents_of(std::span<const double> y) {
+  std::vector<Reading> cents;
+  double before = 0.0;
+  for (std::size_t n = 1; n < y.size(); ++n) {
+    if (y[n - 1] < 0.0 && y[n] >= 0.0) {
+      const double at = static_cast<double>(n) - y[n] / (y[n] - y[n - 1]);
+      if (before > 0.0) {
+        cents.push_back(
+            {0.5 * (at + before) / 44100.0, 1200.0 * std::log2(44100.0 / (at - before) / 440.0)});
+      }
+      before = at;
+    }
+  }
+  return cents;
+}
+
+double greatest(const std::vector<Reading>& readings, double from_s, double to_s) {
+  double most = -1e9;
+  for (const Reading& reading : readings) {
+    if (reading.time_s >= from_s && reading.time_s < to_s) {
+      most = std::max(most, reading.value);
+    }
+  }
+  return most;
+}
+
+// Rate of the upward zero crossings after `from_s`.
+double rate_of(const std::vector<Reading>& readings, double from_s) {
+  std::vector<double> crossings;
+  for (std::size_t i = 1; i < readings.size(); ++i) {
+    const Reading& a = readings[i - 1];
+    const Reading& b = readings[i];
+    if (a.time_s > from_s && a.value < 0.0 && b.value >= 0.0) {
+      crossings.push_back(b.time_s - (b.time_s - a.time_s) * b.value / (b.value - a.value));
+    }
+  }
+  REQUIRE(crossings.size() > 2);
+  return static_cast<double>(crossings.size() - 1) / (crossings.back() - crossings.front());
+}
+
+// Peaks of windows of 10 ms in dB.
+std::vector<Reading> levels_of(std::span<const double> y) {
+  std::vector<Reading> levels;
+  for (std::size_t at = 0; at + 441 <= y.size(); at += 441) {
+    levels.push_back({static_cast<double>(at + 220) / 44100.0,
+                      20.0 * std::log10(std::max(1e-30, peak(y.subspan(at, 441))))});
+  }
+  return levels;
+}
+
+std::vector<double> heard(const Preset& preset, const std::vector<Event>& events,
+                          std::size_t frames = 4 * 44100) {
+  Player player(tone, preset);
+  player.run(frames, events);
+  CHECK(player.heap_calls == 0);
+  return player.y();
+}
+
+const std::vector<Event> one_note = {note_on(0, 69)};
+
+}  // namespace
+
+TEST_CASE("a vibrato has its rate and depth, after its delay and fade", "[gesture]") {
+  for (const LfoShape shape : {LfoShape::sine, LfoShape::triangle}) {
+    const LfoSetting vibrato{
+        .name = "v", .lfo = {.rate_hz = 5.0, .delay_s = 0.5, .fade_s = 1.0, .shape = shape}};
+    const auto cents = cents_of(heard(moved(vibrato, "pitch", -50.0, 50.0), one_note));
+    CHECK(std::fabs(greatest(cents, 0.0, 0.45)) < 0.5);
+    CHECK(greatest(cents, 0.9, 1.1) == Approx(25.0).epsilon(0.15));  // the 3rd crest, at 0.95 s
+    CHECK(greatest(cents, 2.0, 4.0) == Approx(50.0).epsilon(0.05));
+    CHECK(rate_of(cents, 1.5) == Approx(5.0).epsilon(0.01));
+  }
+}
+
+TEST_CASE("a tremolo changes the level by its range in dB", "[gesture]") {
+  const LfoSetting tremolo{.name = "t", .lfo = {.rate_hz = 4.0, .delay_s = 0.5}};
+  const auto there = levels_of(heard(moved(tremolo, "level", -12.0, 0.0), one_note));
+  const auto plain = levels_of(heard(struck(4), one_note));
+  std::vector<Reading> change;
+  for (std::size_t i = 0; i < there.size(); ++i) {
+    change.push_back({there[i].time_s, there[i].value - plain[i].value});
+  }
+  CHECK(greatest(change, 0.02, 0.45) == Approx(-6.0).margin(0.1));  // the middle
+  CHECK(greatest(change, 1.0, 4.0) == Approx(0.0).margin(0.3));
+  for (Reading& reading : change) {
+    reading.value = -reading.value;
+  }
+  CHECK(greatest(change, 1.0, 4.0) == Approx(12.0).margin(0.6));
+  for (Reading& reading : change) {
+    reading.value -= 6.0;
+  }
+  CHECK(rate_of(change, 0.6) == Approx(4.0).epsilon(0.01));
+}
+
+TEST_CASE("the wheel scales the depth of a vibrato, and each note has a vibrato of its own",
+          "[gesture]") {
+  LfoSetting vibrato{.name = "v", .lfo = {.rate_hz = 5.0}};
+  vibrato.by = ControlSource::controller;
+  vibrato.number = 1;
+  const Preset preset = moved(vibrato, "pitch", -50.0, 50.0);
+  CHECK(heard(preset, one_note) == heard(struck(4), one_note));
+  const auto cents = cents_of(heard(preset, {controller(0, 1, 0.5), note_on(0, 69)}));
+  CHECK(greatest(cents, 1.0, 4.0) == Approx(25.0).epsilon(0.05));
+  // A voice that starts later starts its LFO later.
+  const std::vector<double> late =
+      heard(preset, {controller(0, 1, 1.0), note_on(0, 69), note_on(64 * 90, 69 + 12)}, 44100);
+  const std::vector<double> low = heard(preset, {controller(0, 1, 1.0), note_on(0, 69)}, 44100);
+  const std::vector<double> high =
+      heard(preset, {controller(0, 1, 1.0), note_on(0, 69 + 12)}, 44100);
+  double most = 0.0;
+  for (std::size_t n = 0; n < late.size(); ++n) {
+    const double expected = low[n] + (n < 64 * 90 ? 0.0 : high[n - 64 * 90]);
+    most = std::max(most, std::fabs(late[n] - expected));
+  }
+  CHECK(most < 1e-9 * peak(low));
+}
+
+TEST_CASE("the rate differs from note to note by its deviation, and repeats", "[gesture]") {
+  const LfoSetting vibrato{.name = "v", .lfo = {.rate_hz = 5.0, .deviation = 0.2}};
+  const Preset preset = moved(vibrato, "pitch", -50.0, 50.0);
+  const double first = rate_of(cents_of(heard(preset, one_note)), 0.1);
+  const std::vector<double> both =
+      heard(preset, {note_on(0, 60, 1e-12), note_on(64, 69)});  // the second note is louder
+  const double second = rate_of(cents_of(both), 0.1);
+  CHECK(std::fabs(first / 5.0 - 1.0) < 0.21);
+  CHECK(std::fabs(second / 5.0 - 1.0) < 0.21);
+  CHECK(std::fabs(first - second) > 0.02);
+  CHECK(heard(preset, one_note) == heard(preset, one_note));
+}
+
+TEST_CASE("variation changes strength and time within its bounds, and keeps releases",
+          "[gesture]") {
+  constexpr std::uint32_t period = 22050;
+  std::vector<Event> events;
+  for (std::uint32_t i = 0; i < 20; ++i) {
+    events.push_back(note_on(i * period, 69, 0.5));
+    events.push_back(note_off(i * period + 10, 69));  // before the delayed note starts
+  }
+  Preset preset = struck(4);
+  preset.damper_s = 0.05;
+  const std::vector<double> plain = heard(preset, events, 20 * period);
+  preset.varied_strength = 0.1;
+  preset.varied_ms = 20.0;
+  const std::vector<double> y = heard(preset, events, 20 * period);
+  CHECK(y == heard(preset, events, 20 * period));
+  const double usual = peak(std::span(plain).first(period));
+  double least = 1e9;
+  double most = 0.0;
+  double earliest = 1e9;
+  double latest = 0.0;
+  for (std::uint32_t i = 0; i < 20; ++i) {
+    const std::span<const double> note = std::span(y).subspan(i * period, period);
+    const double strength = peak(note) / usual;
+    least = std::min(least, strength);
+    most = std::max(most, strength);
+    const double start = static_cast<double>(
+        std::find_if(note.begin(), note.end(),
+                     [&](double sample) { return std::fabs(sample) > 0.02 * usual; }) -
+        note.begin());
+    earliest = std::min(earliest, start);
+    latest = std::max(latest, start);
+    CHECK(peak(note.subspan(period - 2000)) < 1e-4 * usual);  // the key is up
+  }
+  CHECK(least > 0.899);
+  CHECK(most < 1.101);
+  CHECK(most - least > 0.1);  // 20 numbers in a range of 0.2 span less with odds of 2e-5
+  CHECK(latest < 0.02 * 44100 + 20);
+  CHECK(latest - earliest > 0.01 * 44100);
+}
+
+}  // namespace ressort::lfo_test
