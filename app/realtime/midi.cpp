@@ -75,6 +75,7 @@ bool MidiReader::finish(Event& event) {
       return true;
     case 0x80:
       event.kind = EventKind::note_off;
+      event.value = release_velocity(event.channel, data_[1]);
       return true;
     case 0xa0:
       event.kind = EventKind::key_pressure;
@@ -104,6 +105,17 @@ bool MidiReader::finish(Event& event) {
     default:
       return false;
   }
+}
+
+// Keyboards without a release sensor send 0 or 64 in every note off. So 0 is a speed only if the
+// channel has sent other speeds too.
+double MidiReader::release_velocity(std::uint8_t channel, std::uint8_t byte) {
+  constexpr std::uint8_t usual = 64;
+  const auto bit = static_cast<std::uint16_t>(1U << channel);
+  if (byte != 0 && byte != usual) {
+    has_release_speed_ |= bit;
+  }
+  return byte == 0 && (has_release_speed_ & bit) == 0 ? usual_release_velocity : byte / 127.0;
 }
 
 // Reads a message of the MIDI Tuning Standard. Any device and tuning number is accepted, and the

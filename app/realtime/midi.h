@@ -37,6 +37,7 @@ class MidiReader {
  private:
   bool take(std::uint8_t byte, Event& event);
   bool finish(Event& event);
+  double release_velocity(std::uint8_t channel, std::uint8_t byte);
   void end_exclusive();
   bool next_tuned_key(Event& event);
   bool next_key_of_octave(Event& event);
@@ -44,6 +45,8 @@ class MidiReader {
 
   std::uint8_t status_ = 0;  // status byte of the current message; kept for running status
   std::uint8_t data_[2] = {0, 0};
+  // A bit for each channel that has sent a release velocity other than 0 and 64.
+  std::uint16_t has_release_speed_ = 0;
   int have_ = 0;
   int need_ = 0;
   bool is_begun_ = false;  // a message is incomplete

@@ -252,6 +252,9 @@ struct Engine::Player {
   // Applies a controller's standard meaning, and then the preset's controls of that number.
   void turn_controller(const Event& event) {
     const std::uint8_t channel = event.channel % Channels::count;
+    if (keyboard.channels().is_ignored(channel, event.index)) {
+      return;
+    }
     const ChannelMask reached = reached_by(channel);
     const double modulation = keyboard.channels().modulation(channel);
     if (event.index == all_sound_off || event.index >= all_notes_off) {

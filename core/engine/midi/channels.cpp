@@ -220,6 +220,14 @@ ChannelMask Channels::members() const {
   return mask;
 }
 
+bool Channels::is_ignored(std::uint8_t channel, int number) const {
+  constexpr int last_pedal = 69;  // hold 2
+  constexpr int first_mode = 120;
+  const bool is_for_zone =
+      (number >= sustain_pedal && number <= last_pedal) || number >= first_mode;
+  return is_for_zone && channel < midi_channel_count && is_member(channel);
+}
+
 void Channels::reset(std::uint8_t index) {
   Channel& channel = of(index);
   channel.bend = channel.wheel = 0.0;
@@ -267,7 +275,7 @@ SideGains Channels::balance(std::uint8_t channel) const {
 
 double Channels::damper(std::uint8_t channel) const {
   // Damping grows with the square of the damper's contact.
-  const double contact = std::clamp(1.5 - 2.0 * pedal(channel), 0.0, 1.0);
+  const double contact = std::clamp(2.0 - 4.0 * pedal(channel), 0.0, 1.0);
   return contact * contact;
 }
 

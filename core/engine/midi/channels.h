@@ -65,6 +65,10 @@ class Channels {
   // Returns the channels to which a message applies: the whole MPE zone if `channel` is its master.
   ChannelMask reach(std::uint8_t channel) const;
   bool is_member(std::uint8_t channel) const { return master_of(channel) != channel; }
+  // Returns whether a controller on this channel is to be ignored, because it is for a whole zone,
+  // but came on a member channel: pedals, switches and channel modes (MPE 1.0, appendix E). A
+  // note with an ID has a channel of its own, so its modes end just that note.
+  bool is_ignored(std::uint8_t channel, int number) const;
   // The channels whose zone the last Change::zones has created or ended. Their state was reset.
   ChannelMask rezoned() const { return rezoned_; }
   ChannelMask members() const;  // members of all zones
@@ -84,7 +88,7 @@ class Channels {
   SideGains balance(std::uint8_t channel) const;
   bool sustains(std::uint8_t channel) const { return pedal(channel) >= 0.5; }
   // Returns the share of the damper that lies on the string. It falls from 1 at a quarter of the
-  // sustain pedal's travel to 0 at three quarters.
+  // sustain pedal's travel to 0 at the half, where sustains() begins.
   double damper(std::uint8_t channel) const;
   bool latches(std::uint8_t channel) const {
     return of(channel).sostenuto || zone(channel).sostenuto;

@@ -264,6 +264,34 @@ TEST_CASE("a released note keeps the bend of its channel", "[mpe]") {
   CHECK(ends(zone(0, 15, {a, pressed(1, 100, 1.0), up, pressed(1, 5000, 0.0)}))[0] == Approx(1.0));
 }
 
+TEST_CASE("pedals and modes on a member channel are ignored", "[mpe]") {
+  const auto heard = [](std::vector<Event> events) {
+    Preset preset = struck(4);
+    preset.damper_s = 0.05;
+    Player player(ringing_string(), preset);
+    player.run(20000, events);
+    return player.y();
+  };
+  const auto a = on(1, note_on(100, 60));
+  const auto up = on(1, note_off(8000, 60));
+  const auto held = heard(zone(0, 15, {a}));
+  const auto plain = heard(zone(0, 15, {a, up}));
+  CHECK(plain != held);
+  for (const int number : {120, 121, 123, 124, 126, 127}) {
+    INFO(number);
+    CHECK(heard(zone(0, 15, {a, turned(1, 3000, number, 0)})) == held);
+  }
+  for (const int pedal : {64, 66}) {
+    INFO(pedal);
+    CHECK(heard(zone(0, 15, {a, turned(1, 3000, pedal, 127), up})) == plain);
+    CHECK(heard(zone(0, 15, {a, turned(0, 3000, pedal, 127), up})) == held);
+    // Outside of a zone the channel has its own pedals.
+    CHECK(heard({a, turned(1, 3000, pedal, 127), up}) == heard({a}));
+  }
+  CHECK(heard(zone(0, 15, {a, turned(0, 3000, 120, 0)})) != held);
+  CHECK(heard(zone(0, 15, {a, turned(0, 3000, 123, 0)})) != held);
+}
+
 TEST_CASE("the master's pedals, levels and modes apply to the whole zone", "[mpe]") {
   Playing playing;
   playing.tuning = Tuning::keyboard;

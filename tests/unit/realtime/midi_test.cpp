@@ -49,6 +49,22 @@ TEST_CASE("every channel message becomes an event", "[midi]") {
               usual_release_velocity);  // a note on with velocity 0 is a note off
 }
 
+// Keyboards without a release sensor send 0, or 64, in every note off.
+TEST_CASE("a release velocity of 0 counts once the channel has sent another", "[midi]") {
+  MidiReader reader;
+  const auto released = [&](std::uint8_t channel, std::uint8_t velocity) {
+    return read(reader, {static_cast<std::uint8_t>(0x80 | channel), 60, velocity}).at(0).value;
+  };
+  CHECK(released(0, 0) == usual_release_velocity);
+  CHECK(released(0, 64) == 64 / 127.0);
+  CHECK(released(0, 0) == usual_release_velocity);
+  CHECK(released(0, 1) == 1 / 127.0);
+  CHECK(released(0, 0) == 0.0);
+  CHECK(released(1, 0) == usual_release_velocity);
+  CHECK(read({0x90, 60, 0}).at(0).value == usual_release_velocity);
+  CHECK(read({0x80, 60, 0}).at(0).value == usual_release_velocity);  // another source
+}
+
 TEST_CASE("the bend reaches -1 and 1 exactly", "[midi]") {
   CHECK(read({0xe0, 0, 0})[0].value == -1.0);
   CHECK(read({0xe0, 0x7f, 0x7f})[0].value == 1.0);
