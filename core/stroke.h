@@ -27,6 +27,9 @@ struct GestureSettings {
   double low_hz = 20.0;       // noise, bow: band of the noise
   double high_hz = 20000.0;
   double roughness = 0.0;  // bow: rms of the noise in its speed, as a share of the speed
+
+  // Returns the level of the loudest gesture as a factor.
+  double highest_level() const { return std::pow(10.0, std::max(low_db, high_db) / 20.0); }
 };
 
 // The settings of a control at one key.
@@ -70,6 +73,7 @@ struct Stroke {
   double rate_ratio = 1.0;  // 44 100 Hz to the engine's rate
   double rate_hz = 44100.0;
   double pitch = 1.0;  // the voice's pitch by the written pitch; 1 unless the control follows it
+  double share = 1.0;  // factor on the force of a blow
   bool bare = false;   // nothing is smoothed
   std::uint64_t seed = 0;  // differs from note to note and from input to input
   // Results, set by the gesture.
@@ -114,7 +118,7 @@ struct Stroke {
   double paced(double value) const { return value * rate_ratio * pitch; }
   // Scales the force of a blow, or the displacement that gives the same blow through a spring.
   double struck(double value) const {
-    return is_force ? paced(value) : value / (rate_ratio * pitch);
+    return share * (is_force ? paced(value) : value / (rate_ratio * pitch));
   }
   // Poles of the one-pole filters that smooth a position (44.1 Hz / rate) and a speed (5 ms).
   double pole_of_position() const { return bare ? 0.0 : 1.0 - std::min(1.0, 44.1 / rate_hz); }

@@ -141,9 +141,15 @@ void Gestures::play(const GestureRow& gesture, std::size_t input, Stroke stroke,
   set_pitch(*latest, std::sqrt(keyboard.factor_of(voice, parameters.highest_factor())));
   stroke.pitch = stroke.settings.follows_pitch ? pitches_[*latest] : 1.0;
   stroke.seed = seed_of(voice, input);
+  // A voice's gain applies to all that rings in it. With fixed tuning all keys strike one network,
+  // so the gain must not follow each blow: it is the loudest blow's, and a softer blow has less
+  // force.
+  if (gesture.is_blow && stroke.settings.has_level && playing_.tuning == Tuning::fixed) {
+    stroke.share = stroke.level() / stroke.settings.highest_level();
+  }
   gesture.play(driver(*latest, input), stroke);
   if (stroke.settings.has_level && stroke.amount != 0.0) {
-    keyboard.set_strength(voice, stroke.level());
+    keyboard.set_strength(voice, stroke.level() / stroke.share);
   }
   if (stroke.rest) {
     set_starts(scope.channels, input, *stroke.rest);

@@ -26,6 +26,11 @@ Keyboard::Keyboard(const Playing& playing, double rate_hz, std::size_t outputs)
                               [](const Control& control) {
                                 return control.source == Source::note && control.settings.has_level;
                               })),
+      rings_on_(std::none_of(playing.controls.begin(), playing.controls.end(),
+                             [](const Control& control) {
+                               return control.source == Source::note &&
+                                      row_of(control.gesture).release != nullptr;
+                             })),
       is_stereo_(outputs > 1),
       channels_(static_cast<std::uint8_t>(std::countr_zero(playing.channels) %
                                           static_cast<int>(midi_channel_count))),
@@ -103,12 +108,7 @@ Press Keyboard::press_key(int key, double velocity, std::uint8_t channel, double
     replace(*mono);
   }
   if (!is_fixed && !restrikes_) {
-    // A repeated key damps its earlier voices, as a finger or hammer touches the same string.
-    for (Voice& voice : voices) {
-      if (voice.is_live() && voice.has_key && voice.key == key && voice.channel == channel) {
-        replace(voice);
-      }
-    }
+    replace_voices_of(key, channel, velocity);
   }
   Voice& latest = voices[voices.latest()];
   const bool stays = is_fixed && !latest.fading && latest.is_undamped();
@@ -143,14 +143,19 @@ void Keyboard::attach(Voice& voice, int key, std::uint8_t channel) {
   }
   voice.channel = channel;
   voice.turn = ++turns_;
-  voice.held = true;
-  voice.sustained = voice.latched = voice.is_released = false;
-  damp(voice);
+  hold(voice);
   voice.quiet_frames = 0;
   if (voice.semitones != channels_.semitones(channel)) {
     voice.semitones = channels_.semitones(channel);
     voices.mark_retuned(voice);
   }
+}
+
+// Lifts the damper of a voice whose key goes down.
+void Keyboard::hold(Voice& voice) const {
+  voice.held = true;
+  voice.sustained = voice.latched = voice.is_released = false;
+  damp(voice);
 }
 
 // Returns the voice that already sounds this key, or a lane for a new one.
@@ -220,6 +225,29 @@ void Keyboard::replace(Voice& voice) const {
   voice.is_released = voice.is_replaced = true;
   voice.release_s = replaced_s;
   damp(voice);
+}
+
+// A repeated key damps its earlier voices, as a finger or hammer touches the same string. But a
+// softer strike must not silence a string that rings: the loudest voice rings on beside the new
+// one, and both end with the key. A voice that is bowed or held ends in any case, because its key
+// begins a new stroke.
+void Keyboard::replace_voices_of(int key, std::uint8_t channel, double velocity) {
+  const auto is_earlier = [&](const Voice& voice) {
+    return voice.is_live() && voice.has_key && !voice.is_replaced && voice.key == key &&
+           voice.channel == channel;
+  };
+  const auto may_ring_on = [&](const Voice& voice) {
+    return rings_on_ && is_earlier(voice) && voice.velocity > velocity && voice.level > quiet_level;
+  };
+  Voice* const kept = voices.least_of(
+      may_ring_on, [](const Voice& a, const Voice& b) { return a.level > b.level; });
+  for (Voice& voice : voices) {
+    if (&voice == kept) {
+      hold(voice);
+    } else if (is_earlier(voice)) {
+      replace(voice);
+    }
+  }
 }
 
 void Keyboard::damp_keyless(Voice& voice) const {
@@ -334,8 +362,7 @@ SideGains Keyboard::level_of(const Voice& voice) const {
 }
 
 void Keyboard::set_velocity(Voice& voice, double velocity) {
-  constexpr double highest = 127.0;
-  voice.velocity = highest * velocity;
+  voice.velocity = velocity;
   if (!playing_.curves.empty()) {
     voices.mark_retuned(voice);
   }

@@ -138,6 +138,8 @@ class Keyboard {
   bool is_restruck(const Voice& voice, int key, std::uint8_t channel) const;
   Voice& voice_for(int key, std::uint8_t channel);
   Voice* latest_on(std::uint8_t channel);
+  void hold(Voice& voice) const;
+  void replace_voices_of(int key, std::uint8_t channel, double velocity);
   void replace(Voice& voice) const;
   void move_to(Voice& voice, int key, double own_hz, bool glides, double highest_factor);
   void glide_from(Voice& voice, double frequency_hz) const;
@@ -152,6 +154,7 @@ class Keyboard {
   const Playing& playing_;
   double rate_hz_;
   bool restrikes_;  // a repeated key strikes its sounding voice again
+  bool rings_on_;   // a louder voice rings on beside a repeated key's new one
   bool is_stereo_;
   Channels channels_;
   VoiceTuning tuning_;

@@ -75,6 +75,7 @@ struct alignas(64) Voice {
   double peak = 0.0;              // peak of the network's output since the last update
   SideGains volume_step = {};     // per frame of the ramp
   double strength = 1.0;          // gain by velocity
+  double velocity = 0.0;          // velocity of its last strike, 0..1, after the preset's curve
   double level = 0.0;             // output peak with a slow release
   std::size_t quiet_frames = 0;
   std::uint64_t turn = 0;     // serial number of its key press
@@ -88,7 +89,6 @@ struct alignas(64) Voice {
   double factor = 1.0;        // factor on every stiffness
   double release_s = 0.0;     // T60 of its damper, by release velocity
   double release_velocity = 0.0;  // 0..1
-  double velocity = 0.0;      // of its last strike, 0..127, after the velocity curve
 };
 
 // Returns a parameter's value in one voice. `shared`: the value that all voices share, or the knob
@@ -98,7 +98,9 @@ inline double value_in_voice(const Playing& playing, std::size_t parameter, doub
                              const Voice& voice) {
   const VoiceCurve* const curve =
       playing.tuning == Tuning::keyboard && voice.has_key ? playing.curve_of(parameter) : nullptr;
-  return curve == nullptr ? shared : curve->at(voice.key, voice.velocity, shared);
+  constexpr double highest_velocity = 127.0;
+  return curve == nullptr ? shared
+                          : curve->at(voice.key, highest_velocity * voice.velocity, shared);
 }
 
 // All functions but the constructor: [audio] wait-free, O(voices).

@@ -3,6 +3,8 @@
 //  ressort_voicing [--keys STEP] [PRESET...]           one row each, ! after values out of bounds
 //  ressort_voicing --random N [--seed S] [PRESET...]   N random settings of all controls for each
 //  ressort_voicing --bows N [PRESET...]                bows: N speeds and N pressures, 24 keys
+//  ressort_voicing --restrikes KEY [PRESET...]         level of a ringing note after a soft strike
+//  ressort_voicing --tuner RATE [PRESET...]            pitch of every semitone by YIN
 //
 // Without names, all presets are measured. STEP is the distance in semitones between the keys whose
 // pitch is measured, from 21 to 108 (default 12). The table is Markdown. The sound is measured
@@ -23,7 +25,9 @@
 #include "core/engine/limiter.h"
 #include "tests/bench/voicing/player.h"
 #include "tests/bench/voicing/random_settings.h"
+#include "tests/bench/voicing/restrikes.h"
 #include "tests/bench/voicing/sound.h"
+#include "tests/bench/voicing/tuner.h"
 
 namespace ressort::voicing {
 namespace {
@@ -297,6 +301,8 @@ int run(int argc, char** argv) {
   int step = 12;
   int random = 0;
   int bows = 0;
+  int restrikes = 0;
+  double tuner_hz = 0.0;
   std::uint64_t seed = 1;
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
@@ -310,6 +316,10 @@ int run(int argc, char** argv) {
       random = std::max(1, std::atoi(argv[++i]));
     } else if (word == "--bows") {
       bows = std::max(1, std::atoi(argv[++i]));
+    } else if (word == "--restrikes") {
+      restrikes = std::atoi(argv[++i]);
+    } else if (word == "--tuner") {
+      tuner_hz = std::atof(argv[++i]);
     } else if (word == "--seed") {
       seed = std::strtoull(argv[++i], nullptr, 10);
     } else if (word.starts_with("--")) {
@@ -322,7 +332,7 @@ int run(int argc, char** argv) {
   if (names.empty()) {
     names = known_presets();
   }
-  if (random == 0 && bows == 0) {
+  if (random == 0 && bows == 0 && restrikes == 0 && tuner_hz == 0.0) {
     return print_table(names, step) == 0 ? 0 : 1;
   }
   int failures = 0;
@@ -330,6 +340,12 @@ int run(int argc, char** argv) {
     try {
       if (bows > 0) {
         failures += bow(name, bows);
+      } else if (restrikes > 0) {
+        Player player(name, 44100.0);
+        failures += check_restrikes(player, name, restrikes);
+      } else if (tuner_hz > 0.0) {
+        Player player(name, tuner_hz);
+        failures += check_semitones(player, name);
       } else {
         Player player(name, 48000.0);
         failures += play_random_settings(player, name, random, seed);

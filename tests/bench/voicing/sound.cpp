@@ -307,6 +307,92 @@ Pitch pitch_of(const Stereo& sound, double wanted_hz) {
   return pitch;
 }
 
+double yin_hz(const Stereo& sound, double lowest_hz, double highest_hz) {
+  constexpr double deep = 0.1;
+  const std::size_t louder = energy_of(sound.channels[0]) < energy_of(sound.channels[1]) ? 1 : 0;
+  const std::vector<double>& y = sound.channels[louder];
+  const auto longest =
+      std::min(static_cast<std::size_t>(sound.rate_hz / lowest_hz) + 2, y.size() / 2);
+  const auto shortest =
+      std::max<std::size_t>(2, static_cast<std::size_t>(sound.rate_hz / highest_hz));
+  const auto difference = [&](std::size_t lag) {
+    double sum = 0.0;
+    for (std::size_t n = 0; n + y.size() / 2 < y.size(); ++n) {
+      sum += (y[n] - y[n + lag]) * (y[n] - y[n + lag]);
+    }
+    return sum;
+  };
+  std::vector<double> d(longest + 1);
+  std::vector<double> normalised(longest + 1, 1.0);
+  double sum = 0.0;
+  for (std::size_t lag = 1; lag <= longest; ++lag) {
+    d[lag] = difference(lag);
+    sum += d[lag];
+    normalised[lag] = sum > 0.0 ? d[lag] * static_cast<double>(lag) / sum : 1.0;
+  }
+  std::size_t dip = shortest;
+  for (std::size_t lag = shortest; lag < longest; ++lag) {
+    dip = normalised[lag] < normalised[dip] ? lag : dip;
+    if (normalised[dip] < deep && normalised[lag + 1] > normalised[lag]) {
+      break;
+    }
+  }
+  // Returns the minimum of a parabola through three neighbours.
+  const auto minimum_near = [&](std::size_t lag) {
+    const double a = difference(lag - 1);
+    const double b = difference(lag);
+    const double c = difference(lag + 1);
+    const double curve = a - 2.0 * b + c;
+    const double offset = curve > 0.0 ? std::clamp(0.5 * (a - c) / curve, -1.0, 1.0) : 0.0;
+    return static_cast<double>(lag) + offset;
+  };
+  // The period is refined at a multiple after each doubling, where a sample is a smaller share.
+  double period = minimum_near(dip);
+  constexpr double fine = 400.0;  // samples: a tenth of one is 0.4 cents
+  for (double times = 2.0; times * period < std::min(fine, 0.45 * static_cast<double>(y.size()));
+       times *= 2.0) {
+    auto lag = static_cast<std::size_t>(std::lround(times * period));
+    lag = difference(lag - 1) < difference(lag)   ? lag - 1
+          : difference(lag + 1) < difference(lag) ? lag + 1
+                                                  : lag;
+    period = minimum_near(lag) / times;
+  }
+  return sound.rate_hz / period;
+}
+
+double partials_cents(const Stereo& sound, double wanted_hz) {
+  const Spectrum spectrum = spectrum_of(sound, 4);
+  const std::vector<double>& magnitude = spectrum.magnitude;
+  constexpr double half_semitone = 0.029;
+  double weight = 0.0;
+  double moment = 0.0;
+  for (int n = 1; n <= 8; ++n) {
+    const double hz = wanted_hz * n;
+    const auto first = static_cast<std::size_t>(hz * (1.0 - half_semitone) / spectrum.bin_hz);
+    const auto last = static_cast<std::size_t>(hz * (1.0 + half_semitone) / spectrum.bin_hz) + 1;
+    if (last + 1 >= magnitude.size()) {
+      break;
+    }
+    const auto peak = static_cast<std::size_t>(
+        std::max_element(magnitude.begin() + static_cast<std::ptrdiff_t>(first),
+                         magnitude.begin() + static_cast<std::ptrdiff_t>(last) + 1) -
+        magnitude.begin());
+    if (peak == first || peak == last) {
+      continue;  // the slope of another peak
+    }
+    // A parabola through the logarithms of three bins.
+    const double a = std::log(magnitude[peak - 1] + 1e-30);
+    const double b = std::log(magnitude[peak] + 1e-30);
+    const double c = std::log(magnitude[peak + 1] + 1e-30);
+    const double curve = a - 2.0 * b + c;
+    const double at = static_cast<double>(peak) + (curve < 0.0 ? 0.5 * (a - c) / curve : 0.0);
+    const double power = magnitude[peak] * magnitude[peak];
+    weight += power;
+    moment += power * cents(at * spectrum.bin_hz, hz);
+  }
+  return weight > 0.0 ? moment / weight : 0.0;
+}
+
 double cents(double hz, double from_hz) {
   return 1200.0 * std::log2(hz / from_hz);
 }

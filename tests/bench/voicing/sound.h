@@ -55,6 +55,15 @@ struct Pitch {
 // rounding precision.
 Pitch pitch_of(const Stereo& sound, double wanted_hz);
 
+// Returns the pitch by YIN (de Cheveigne and Kawahara 2002) between two frequencies: the first dip
+// of the normalised difference function below 0.1, else its lowest point. Multiples of the period
+// sharpen the result.
+double yin_hz(const Stereo& sound, double lowest_hz, double highest_hz);
+
+// Returns the mean deviation in cents of the first eight partials from the harmonics of a
+// frequency, weighted by their powers. A partial lies within half a semitone of its harmonic.
+double partials_cents(const Stereo& sound, double wanted_hz);
+
 double cents(double hz, double from_hz);
 
 }  // namespace ressort::voicing
