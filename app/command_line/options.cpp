@@ -122,6 +122,9 @@ void add_keys(CLI::App& command, KeyOptions& keys) {
           "--a4", [&keys](const double& hz) { keys.a4_hz = hz; }, "pitch of A4 (default 440)")
       ->type_name("HZ")
       ->check(within(220.0, 880.0));
+  command.add_option("--transpose", keys.transpose, "semitones added to every preset's keys")
+      ->type_name("SEMITONES")
+      ->check(within(-most_transpose, most_transpose));
 }
 
 void add_force(CLI::App& command, bool& force) {

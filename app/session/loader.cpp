@@ -215,6 +215,7 @@ class SceneReader {
       Preset& tuned = scene.value->preset;
       tuned.keys_hz = *std::move(keys.value);
       tuned.a4_hz = options_.keys.a4_hz.value_or(tuned.a4_hz);
+      tuned.transpose += options_.keys.transpose;
       tuned.channels = options_.keys.channels.value_or(tuned.channels);
       for (const Finding& finding : scene.findings) {
         if (finding.diagnostic.severity == Severity::warning) {

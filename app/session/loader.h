@@ -49,6 +49,7 @@ struct KeyOptions {
   std::string scale;                 // path of a Scala file; empty: the preset's
   std::string keyboard_map;          // the same for a keyboard map
   std::optional<double> a4_hz;       // frequency of A4
+  int transpose = 0;                 // semitones, added to the preset's
   std::optional<unsigned> channels;  // bit mask of the received MIDI channels
 };
 

@@ -104,6 +104,9 @@ void print(FlightWriter& out, const FlightSetup& setup) {
   if (setup.keys.a4_hz) {
     out.line("a4", *setup.keys.a4_hz);
   }
+  if (setup.keys.transpose != 0) {
+    out.line("transpose", setup.keys.transpose);
+  }
   if (setup.keys.channels) {
     out.line("channels", *setup.keys.channels);
   }
@@ -245,6 +248,8 @@ class FlightReader {
       setup.third = static_cast<ThirdArgument>(words.whole<int>(1));
     } else if (key == "a4") {
       setup.keys.a4_hz = words.number(1.0, 1e5);
+    } else if (key == "transpose") {
+      setup.keys.transpose = static_cast<int>(words.number(-most_transpose, most_transpose));
     } else if (key == "channels") {
       setup.keys.channels = words.whole<unsigned>(0xffff);
     } else if (key == "scale") {

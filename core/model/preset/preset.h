@@ -20,6 +20,7 @@
 namespace ressort::model {
 
 inline constexpr double usual_a4_hz = 440.0;
+inline constexpr int most_transpose = 96;  // semitones, up or down
 
 struct ParameterSetting {
   std::string name;

@@ -246,7 +246,7 @@ TEST_CASE("A flight contains the texts as they were when they were played", "[fl
       "0.3] }\n[[control]]\nfrom = \"note\"\nto = \"in1\"\nhow = \"impulse\"\nrange = [0.02, "
       "0.1]\n");
   SessionOptions options{.compile = {.rate_hz = rate_hz},
-                         .keys = {.a4_hz = 430.0},
+                         .keys = {.a4_hz = 430.0, .transpose = -3},
                          .watch = true,
                          .keeps_flights = true};
   Stage stage(options);

@@ -43,6 +43,7 @@ TEST_CASE("a preset's scale is beside it", "[tunings]") {
   // Options override it; a keyboard map alone has twelve equal semitones.
   scene = load_scene(tuned, {.keys = {.a4_hz = 415.0, .channels = 4U}});
   CHECK((scene->preset.a4_hz == 415.0 && scene->preset.channels == 4U));
+  CHECK(load_scene(plain, {.keys = {.transpose = -5}})->preset.transpose == -5);
   scene = load_scene(plain, {.keys = {.scale = folder.file("two.scl")}});
   CHECK(scene->preset.keys_hz[62] == Approx(2.0 * c_hz));
   scene = load_scene(plain, {.keys = {.keyboard_map = folder.file("map.kbm")}});
