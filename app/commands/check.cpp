@@ -50,6 +50,7 @@ json findings_json(const std::vector<Finding>& findings) {
 
 // Results of the stability analysis of a scene.
 struct Proved {
+  std::string file;         // the body that `certificate` is about; empty: the model
   Certificate certificate;  // proof for all of the preset's ranges, or for the model's own values
   double stiffness_factor = 0.0;
   bool is_exact = true;     // false: by a bound
@@ -57,24 +58,61 @@ struct Proved {
   std::vector<std::optional<SafeRange>> safe;  // [parameter]
 };
 
-Proved prove(const Scene& scene, const Compiled& compiled, const Progress& progress) {
-  const Instrument& instrument = compiled.instrument;
-  const ParameterBox box = preset_box(instrument.parameters, scene.preset);
-  ParameterBox as_written;
-  for (const ParameterInfo& info : instrument.parameters) {
-    as_written.lowest.push_back(info.value);
-    as_written.highest.push_back(info.value);
+// Returns the box of the start values only.
+ParameterBox start_box(const std::vector<ParameterInfo>& parameters) {
+  ParameterBox box;
+  for (const ParameterInfo& info : parameters) {
+    box.lowest.push_back(info.value);
+    box.highest.push_back(info.value);
   }
-  Stability stability(compiled.stability.proved, 1.0, Stability::most_exact_masses, progress);
+  return box;
+}
+
+// Returns the common part of two ranges.
+std::optional<SafeRange> common(const std::optional<SafeRange>& a,
+                                const std::optional<SafeRange>& b) {
+  return a && b ? std::optional(
+                      SafeRange{std::max(a->lowest, b->lowest), std::min(a->highest, b->highest)})
+                : std::nullopt;
+}
+
+// Analyses the model, or a body of the preset.
+Proved prove(const StabilityCheck& check, const std::vector<ParameterInfo>& parameters,
+             const Preset& preset, const Progress& progress) {
+  const ParameterBox box = preset_box(parameters, preset);
+  Stability stability(check.proved, 1.0, Stability::most_exact_masses, progress);
   progress.stage("checking the stability in all ranges");
   Proved proved{.certificate = stability.certify(box),
                 .stiffness_factor = stability.stiffness_factor(box)};
   proved.others_move = proved.certificate.verdict == Verdict::stable;
   proved.is_exact = stability.is_exact();
   progress.stage("finding the limits of the parameters");
-  for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
-    proved.safe.push_back(stability.safe_range(proved.others_move ? box : as_written, i,
-                                               instrument.parameters[i].value));
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    proved.safe.push_back(stability.safe_range(proved.others_move ? box : start_box(parameters), i,
+                                               parameters[i].value));
+  }
+  return proved;
+}
+
+Proved prove(const Scene& scene, const Compiled& compiled, const Progress& progress) {
+  const std::vector<ParameterInfo>& parameters = compiled.instrument.parameters;
+  Proved proved = prove(compiled.stability, parameters, scene.preset, progress);
+  for (const CompiledBody& body : compiled.bodies) {
+    const std::vector<ParameterInfo>& own = body.stability.parameters;
+    const Proved other = prove(body.stability, own, scene.preset, progress);
+    for (std::size_t i = 0; i < parameters.size(); ++i) {
+      for (std::size_t k = 0; k < own.size(); ++k) {
+        if (own[k].name == parameters[i].name) {
+          proved.safe[i] = common(proved.safe[i], other.safe[k]);
+        }
+      }
+    }
+    proved.others_move = proved.others_move && other.others_move;
+    proved.is_exact = proved.is_exact && other.is_exact;
+    if (proved.certificate.verdict == Verdict::stable) {
+      proved.certificate = other.certificate;
+      proved.file = other.certificate.verdict == Verdict::stable ? "" : body.file;
+    }
   }
   return proved;
 }
@@ -165,6 +203,9 @@ json scene_json(const Scene& scene, const Compiled& compiled, const Proved& prov
                     {"links", part.links},
                     {"estimated_ns", part.estimated_ns},
                     {"reason", part.reason}});
+    if (!part.body.empty()) {
+      plan.back()["body"] = part.body;
+    }
     if (part.accuracy) {
       plan.back()["off"] = accuracy_json(*part.accuracy);
     }
@@ -198,7 +239,9 @@ void warn(const Proved& proved, const Scene& scene, std::vector<Finding>& findin
   if (!proved.certificate.culprit) {
     return;
   }
-  Finding finding = finding_in_model(scene, complaint(proved.certificate));
+  const Error error = complaint(proved.certificate);
+  Finding finding =
+      proved.file.empty() ? finding_in_model(scene, error) : finding_in_file(proved.file, error);
   finding.diagnostic.severity = Severity::warning;
   findings.push_back(std::move(finding));
 }
@@ -299,7 +342,11 @@ int check(const CheckOptions& options) {
   std::optional<Proved> proved;
   if (compiled && options.as != CheckAs::model) {
     proved = prove(*reading.scene, *compiled, progress);
-    if (!compiled->stability.complaint) {
+    const bool is_told =
+        compiled->stability.complaint ||
+        std::any_of(compiled->bodies.begin(), compiled->bodies.end(),
+                    [](const CompiledBody& body) { return body.stability.complaint.has_value(); });
+    if (!is_told) {
       warn(*proved, *reading.scene, reading.findings);
     }
     warn(*reading.scene, *compiled, reading.findings);

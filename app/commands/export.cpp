@@ -46,6 +46,15 @@ int export_to_faust(const ExportOptions& options) {
     std::fprintf(stderr, "%s\n", scene.error().message.c_str());
     return exit_code::wrong_use;
   }
+  if (!scene->preset.bodies.empty()) {
+    const SourceLocation at = scene->preset.through_location;
+    const Error error{
+        "the models of 'through' cannot be exported with the voices; export each "
+        "model by its own name and join them with ':'",
+        at.line, at.column};
+    std::fprintf(stderr, "%s\n", to_string(finding_of(scene->path, "", error)).c_str());
+    return exit_code::wrong_use;
+  }
   for (const std::string& warning : scene->warnings) {
     std::fprintf(stderr, "%s\n", warning.c_str());
   }

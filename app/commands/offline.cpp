@@ -260,8 +260,11 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
   if (!scene) {
     return scene.error();
   }
-  const std::string read[] = {scene->path, scene->model_path, options.score, options.input,
-                              options.midi};
+  std::vector<std::string> read = {scene->path, scene->model_path, options.score, options.input,
+                                   options.midi};
+  for (const BodyModel& body : scene->preset.bodies) {
+    read.push_back(body.file);
+  }
   if (auto spared = check_not_input(options.output, read); !spared) {
     return spared.error();
   }

@@ -85,7 +85,7 @@ std::string describe_json(const Session& session) {
     plan.push_back({{"method", method_name(part.method)},
                     {"masses", part.masses},
                     {"links", part.links},
-                    {"reason", part.reason}});
+                    {"reason", (part.body.empty() ? "" : part.body + ": ") + part.reason}});
   }
   json presets = json::array();
   for (const std::string& name : known_presets()) {

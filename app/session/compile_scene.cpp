@@ -15,6 +15,12 @@ Finding in_model(const Scene& scene, const Error& error, Severity severity) {
   return finding;
 }
 
+Finding in_body(const std::string& file, const Error& error, Severity severity) {
+  Finding finding = finding_in_file(file, error);
+  finding.diagnostic.severity = severity;
+  return finding;
+}
+
 Finding in_preset(const Scene& scene, const Error& error) {
   const auto text = read_text(scene.path, max_preset_bytes);
   Finding finding = finding_of(scene.path, text ? std::string_view(*text) : "", error);
@@ -38,23 +44,33 @@ CompiledScene compile_to_play(const Scene& scene, const CompileOptions& options,
     admission.findings.push_back(in_model(scene, compiled.error(), Severity::error));
     return admission;
   }
-  const StabilityCheck& stability = compiled->stability;
-  if (stability.complaint) {
-    const bool is_refused = stability.verdict == Verdict::unstable && !options.force;
-    Error complaint = *stability.complaint;
-    complaint.message += is_refused ? "; pass --force to play it anyway" : "";
-    admission.findings.push_back(
-        in_model(scene, complaint, is_refused ? Severity::error : Severity::warning));
-  }
-  for (const Error& narrowed : stability.narrowed) {
-    admission.findings.push_back(in_preset(scene, narrowed));
-  }
-  if (compiled->schemes.hazard) {
-    admission.findings.push_back(in_model(scene, *compiled->schemes.hazard, Severity::warning));
-  }
-  if (compiled->strong_bow) {
-    admission.findings.push_back(
-        in_model(scene, *compiled->strong_bow, is_strict ? Severity::error : Severity::warning));
+  // `in_file` makes a finding in the model's file, or in a body's.
+  const auto report = [&](const StabilityCheck& stability, const std::optional<Error>& hazard,
+                          const std::optional<Error>& strong_bow, auto&& in_file) {
+    if (stability.complaint) {
+      const bool is_refused = stability.verdict == Verdict::unstable && !options.force;
+      Error complaint = *stability.complaint;
+      complaint.message += is_refused ? "; pass --force to play it anyway" : "";
+      admission.findings.push_back(
+          in_file(complaint, is_refused ? Severity::error : Severity::warning));
+    }
+    for (const Error& narrowed : stability.narrowed) {
+      admission.findings.push_back(in_preset(scene, narrowed));
+    }
+    if (hazard) {
+      admission.findings.push_back(in_file(*hazard, Severity::warning));
+    }
+    if (strong_bow) {
+      admission.findings.push_back(
+          in_file(*strong_bow, is_strict ? Severity::error : Severity::warning));
+    }
+  };
+  report(compiled->stability, compiled->schemes.hazard, compiled->strong_bow,
+         [&](const Error& error, Severity severity) { return in_model(scene, error, severity); });
+  for (const CompiledBody& body : compiled->bodies) {
+    report(
+        body.stability, body.hazard, body.strong_bow,
+        [&](const Error& error, Severity severity) { return in_body(body.file, error, severity); });
   }
   const std::vector<Part>& parts = compiled->plan.parts;
   const auto broken = missed_budget(compiled->plan);

@@ -221,7 +221,8 @@ std::optional<LearnedRow> CurrentScene::assign_moved_controller(const Meters& no
   return row;
 }
 
-Result<std::string> CurrentScene::preset_text(const std::string& model, double extra_gain) const {
+Result<std::string> CurrentScene::preset_text(const std::string& model, double extra_gain,
+                                              std::vector<std::string> through) const {
   const std::lock_guard lock(mutex_);
   if (loaded_->serial == 0) {
     return Error{"nothing is loaded that could be saved"};
@@ -249,6 +250,7 @@ Result<std::string> CurrentScene::preset_text(const std::string& model, double e
     }
   }
   changes.model = model;
+  changes.through = std::move(through);
   changes.gain = loaded_->instrument.gain / extra_gain;
   Preset generated = loaded_->preset;
   generated.model = changes.model;

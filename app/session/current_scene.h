@@ -85,9 +85,11 @@ class CurrentScene {
   // Gives the waiting target to the controller that has moved. Returns the pair. [worker]
   std::optional<LearnedRow> assign_moved_controller(const Meters& now);
 
-  // Returns the preset with the present values and learned controllers, and with this model.
-  // `extra_gain` is the factor that the session applies to all presets.
-  Result<std::string> preset_text(const std::string& model, double extra_gain) const;
+  // Returns the preset with the present values and learned controllers, with this model and,
+  // if given, with these models of `through`. `extra_gain` is the factor that the session applies
+  // to all presets.
+  Result<std::string> preset_text(const std::string& model, double extra_gain,
+                                  std::vector<std::string> through = {}) const;
 
  private:
   // All of these: with the lock held.

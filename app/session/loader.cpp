@@ -246,11 +246,7 @@ class SceneReader {
     if (!paths) {
       return failed<Scene>(file.error(paths.error().message, file.preset.model_location));
     }
-    Stage<Scene> scene = read_model(
-        *paths, file.path,
-        options_.third ? ReadOptions{.third = options_.third}
-                       : ReadOptions{.third = file.preset.third, .third_by = "the preset says"},
-        false);
+    Stage<Scene> scene = read_model(*paths, file.path, read_options(file), false);
     if (!scene.value) {
       return scene;
     }
@@ -264,6 +260,17 @@ class SceneReader {
       if (!scene.value) {
         return scene;
       }
+    }
+    if (!file.preset.through.empty()) {
+      Stage<std::vector<BodyModel>> bodies = read_bodies(file);
+      std::move(bodies.findings.begin(), bodies.findings.end(), std::back_inserter(scene.findings));
+      if (!bodies.value) {
+        scene.value.reset();
+        return scene;
+      }
+      scene.value->preset.bodies = *std::move(bodies.value);
+      scene.value->network =
+          with_body_parameters(std::move(scene.value->network), scene.value->preset);
     }
     const std::vector<Error> unfit = find_preset_errors(scene.value->network, scene.value->preset);
     for (const Error& error : unfit) {
@@ -286,16 +293,50 @@ class SceneReader {
     names.insert(names.begin(), file.preset.model);
     std::vector<std::string> paths;
     for (const std::string& name : names) {
-      const auto model = find_beside(file.path, "models", name);
+      auto model = find_model(file, name);
       if (!model) {
-        return Error{options_.reach == Reach::own_folders
-                         ? "its model is outside the program's folders, so OSC cannot load it"
-                         : "the model '" + name + "' is neither beside the preset nor in '" +
-                               models_folder() + "'"};
+        return model.error();
       }
-      paths.push_back(*model);
+      paths.push_back(*std::move(model));
     }
     return paths;
+  }
+
+  Result<std::string> find_model(const PresetFile& file, const std::string& name) {
+    if (auto model = find_beside(file.path, "models", name)) {
+      return *std::move(model);
+    }
+    return Error{options_.reach == Reach::own_folders
+                     ? "its model is outside the program's folders, so OSC cannot load it"
+                     : "the model '" + name + "' is neither beside the preset nor in '" +
+                           models_folder() + "'"};
+  }
+
+  // Reads the models of the preset's `through`.
+  Stage<std::vector<BodyModel>> read_bodies(const PresetFile& file) {
+    Stage<std::vector<BodyModel>> bodies{std::vector<BodyModel>(), {}};
+    for (const std::string& name : file.preset.through) {
+      const auto path = find_model(file, name);
+      if (!path) {
+        bodies.findings.push_back(file.error(path.error().message, file.preset.through_location));
+        bodies.value.reset();
+        continue;
+      }
+      Stage<Scene> body = read_model({*path}, *path, read_options(file), false);
+      std::move(body.findings.begin(), body.findings.end(), std::back_inserter(bodies.findings));
+      if (!body.value) {
+        bodies.value.reset();
+      } else if (bodies.value) {
+        bodies.value->push_back({*path, std::move(body.value->network)});
+      }
+    }
+    return bodies;
+  }
+
+  // Returns how a preset reads its models.
+  ReadOptions read_options(const PresetFile& file) const {
+    return options_.third ? ReadOptions{.third = options_.third}
+                          : ReadOptions{.third = file.preset.third, .third_by = "the preset says"};
   }
 
   // Joins the model's files and parses them. A model alone gets a generated preset.
@@ -496,14 +537,18 @@ Finding finding_of(const std::string& file, std::string_view text, const Error& 
   return finding;
 }
 
+Finding finding_in_file(const std::string& path, const Error& error) {
+  const auto text = read_text(path, max_model_bytes);
+  return finding_of(path, text ? std::string_view(*text) : "", error);
+}
+
 Finding finding_in_model(const Scene& scene, const Error& error) {
   // A scene made in memory has a path and no texts.
   const ModelText file =
       scene.texts.empty() ? ModelText{scene.model_path, 1} : text_at(scene.texts, error.line);
   Error there = error;
   there.line -= error.line > 0 ? file.first_line - 1 : 0;
-  const auto text = read_text(file.path, max_model_bytes);
-  return finding_of(file.path, text ? std::string_view(*text) : "", there);
+  return finding_in_file(file.path, there);
 }
 
 std::string to_string(const Finding& finding) {

@@ -34,6 +34,9 @@ struct SceneFile {
 // Makes a finding from an error in the file that contains `text`.
 Finding finding_of(const std::string& file, std::string_view text, const Error& error);
 
+// Makes a finding from an error in a model's file. Blocks on the disk.
+Finding finding_in_file(const std::string& path, const Error& error);
+
 // Makes a finding from an error in the model, with the file that its line comes from. Blocks on the
 // disk.
 Finding finding_in_model(const Scene& scene, const Error& error);

@@ -136,7 +136,12 @@ Result<std::string> Session::save(const std::string& name, Existing existing) {
     }
     model = *kept;
   }
-  const auto text = current_.preset_text(model_name_elsewhere(model), options_.gain);
+  std::vector<std::string> through;
+  for (const BodyModel& body : current()->preset.bodies) {
+    through.push_back(model_name_elsewhere(body.file));
+  }
+  const auto text =
+      current_.preset_text(model_name_elsewhere(model), options_.gain, std::move(through));
   if (!text) {
     return text.error();
   }
@@ -152,22 +157,28 @@ Result<std::string> Session::save_to(const std::string& folder) {
     return Error{"nothing is loaded that could be saved"};
   }
   const std::string name = now->name + ".toml";
+  const fs::path from = fs::path(now->path).parent_path();
+  // A file below the preset's folder keeps its relative path; all others go beside the preset.
+  const auto place_of = [&](const std::string& path) {
+    const fs::path place = fs::path(path).lexically_relative(from);
+    const bool is_below = !place.empty() && *place.begin() != ".." && path != now->model_path;
+    return is_below ? place : fs::path(path).filename();
+  };
+  std::vector<std::string> through;
+  for (const BodyModel& body : now->preset.bodies) {
+    through.push_back(place_of(body.file).string());
+  }
   const auto text =
-      current_.preset_text(fs::path(now->model_path).filename().string(), options_.gain);
+      current_.preset_text(place_of(now->model_path).string(), options_.gain, std::move(through));
   if (!text) {
     return text.error();
   }
-  const fs::path from = fs::path(now->path).parent_path();
   for (const SceneFile& file : *files) {
     const bool is_preset = file.path == now->path && file.path.ends_with(".toml");
     if (!file.is_there || is_preset) {
       continue;
     }
-    // A file below the preset's folder keeps its relative path; all others go beside the preset.
-    fs::path place = fs::path(file.path).lexically_relative(from);
-    if (place.empty() || *place.begin() == ".." || file.path == now->model_path) {
-      place = fs::path(file.path).filename();
-    }
+    const fs::path place = place_of(file.path);
     std::error_code error;
     fs::create_directories((folder / place).parent_path(), error);
     if (auto written = write_text((folder / place).string(), file.text, Existing::replace);

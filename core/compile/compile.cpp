@@ -7,6 +7,7 @@
 
 #include "core/compile/accuracy/bow_limit.h"
 #include "core/compile/analyse.h"
+#include "core/compile/bodies.h"
 #include "core/compile/cull.h"
 #include "core/compile/make_engine.h"
 #include "core/compile/prove.h"
@@ -193,7 +194,17 @@ Result<Compiled> compile_by_stages(const CompileRequest& request) {
   Machine machine = tabulate(network, culled, schemes.links, analysis->values, options.rate_hz,
                              options.rescale, progress);
 
-  const Proof proof = prove(request, reduced, *analysis, schemes, machine);
+  const auto parts = std::count_if(machine.parts.begin(), machine.parts.end(),
+                                   [](const Program& program) { return program.moving > 0; });
+  auto body = compile_body(request, network, analysis->start, static_cast<std::size_t>(parts));
+  if (!body) {
+    return body.error();
+  }
+
+  Proof proof = prove(request, reduced, *analysis, schemes, machine);
+  if (*body) {
+    proof.stability = within_ranges_of(**body, std::move(proof.stability));
+  }
   Planned planned = plan(request, *analysis, proof, std::move(machine));
   const TunedKeys keys = tune(request, network, *analysis, proof.margins, planned,
                               voice_curves(network, preset, proof.stability));
@@ -202,9 +213,15 @@ Result<Compiled> compile_by_stages(const CompileRequest& request) {
                                 options.executor, options.most_bytes)) {
     return *std::move(error);
   }
+  // The voices move the body by their outputs as they are. The last body has the preset's gain.
+  const double body_gain =
+      *body ? find_largest_gain((*body)->engine->machine(), options.isa, progress) *
+                  (*body)->heard_gain
+            : 1.0;
   const auto playing_with = [&](int voices, double gain) {
     Playing playing = make_playing(network, preset, proof, keys, options.bare, voices, gain);
     playing.share = options.share;
+    playing.body_gain = body_gain;
     return playing;
   };
   std::optional<double> factor = 1.0;  // factor on the preset's gain
@@ -214,16 +231,19 @@ Result<Compiled> compile_by_stages(const CompileRequest& request) {
         find_gain(planned.machine, playing_with(1, 1.0), options.precision, options.isa, progress);
   }
   const double gain = preset.gain * factor.value_or(1.0);
+  const double voice_gain = *body ? 1.0 : gain;
+  const double heard_gain = voice_gain * body_gain;
 
   BowCheck bows = check_bows(request, network, schemes, *analysis, proof, planned.machine, keys);
   std::vector<std::string> notes =
       make_notes(request, reduced, schemes, culled, proof, keys, !factor, bows);
   progress.stage("making its voices");
-  Instrument instrument = make_instrument(network, preset, proof, keys, request.voices, gain);
+  Instrument instrument = make_instrument(network, preset, proof, keys, request.voices, heard_gain);
+  instrument.gain = gain;
   instrument.struck = find_struck(request.written, planned.machine);
   std::optional<Accuracy> accuracy = accuracy_of(planned.parts);
-  return Compiled{
-      .engine = make_engine(std::move(planned.machine), playing_with(request.voices, gain),
+  Compiled compiled{
+      .engine = make_engine(std::move(planned.machine), playing_with(request.voices, voice_gain),
                             options.precision, options.isa, progress, options.executor),
       .instrument = std::move(instrument),
       .plan = {.parts = std::move(planned.parts),
@@ -232,7 +252,12 @@ Result<Compiled> compile_by_stages(const CompileRequest& request) {
                .notes = std::move(notes)},
       .stability = proof.stability,
       .schemes = schemes,
-      .strong_bow = std::move(bows.error)};
+      .strong_bow = std::move(bows.error),
+      .heard_gain = heard_gain};
+  if (*body) {
+    add_body(compiled, **std::move(body), preset.bodies.front().file);
+  }
+  return compiled;
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 
 #include <memory>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "core/compile/instrument.h"
 #include "core/compile/options.h"
@@ -14,6 +16,14 @@
 
 namespace ressort::compile {
 
+// A body that the voices pass through, as compiled. Errors have lines of its file.
+struct CompiledBody {
+  std::string file;
+  StabilityCheck stability;
+  std::optional<Error> hazard;      // see Schemes
+  std::optional<Error> strong_bow;  // see Compiled
+};
+
 struct Compiled {
   std::unique_ptr<Engine> engine;
   Instrument instrument;
@@ -21,11 +31,14 @@ struct Compiled {
   StabilityCheck stability;  // the caller decides whether an unstable engine may play
   Schemes schemes;
   std::optional<Error> strong_bow;  // a bow too strong for its time steps, at the model's line
+  double heard_gain = 1.0;          // level that is heard per unit of position
+  std::vector<CompiledBody> bodies;  // bodies of the preset's `through`, in their order
 };
 
 // Compiles a network in stages (see compile_by_stages() in compile.cpp). Fails with the preset's
 // line if the preset does not fit the network, with the model's line if an argument is not finite
-// at the start values, and if the engine does not fit into memory. [any thread but audio]
+// at the start values, and if the engine does not fit into memory. The preset's bodies
+// become one engine with it. [any thread but audio]
 Result<Compiled> compile_network(const Network& network, const Preset& preset,
                                  const CompileOptions& options);
 

@@ -225,6 +225,7 @@ Preset without_swings(Preset preset) {
     control.has_level = false;  // a level scales the sound only
   }
   preset.gain = 1.0;
+  preset.bodies.clear();
   return preset;
 }
 

@@ -500,8 +500,9 @@ std::optional<std::string> missed_budget(const Plan& plan) {
 std::string describe(const std::vector<Part>& parts) {
   std::string text;
   for (const Part& part : parts) {
-    text += std::string(method_name(part.method)) + ": " + count_of(part.masses, "mass", "masses") +
-            ", " + count_of(part.links, "link", "links") + " (" + part.reason +
+    text += (part.body.empty() ? "" : part.body + ": ") + std::string(method_name(part.method)) +
+            ": " + count_of(part.masses, "mass", "masses") + ", " +
+            count_of(part.links, "link", "links") + " (" + part.reason +
             (part.measured_ns > 0.0
                  ? "; measured " + in_ns(part.measured_ns) + " a sample for " +
                        count_of(static_cast<std::size_t>(part.voices), "voice", "voices") +

@@ -36,6 +36,7 @@ struct Part {
   bool is_untimed = false;           // Not all of its possible forms are measured yet.
   std::optional<Accuracy> accuracy;  // if a budget limits pitch or decay
   std::string reason;
+  std::string body;  // file name of the body that it belongs to; empty: the voices
 
   // Returns the time on this machine if it is known, otherwise the estimate.
   double ns() const { return measured_ns > 0.0 ? measured_ns : estimated_ns; }

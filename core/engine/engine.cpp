@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <type_traits>
 #include <utility>
 #include <variant>
 
 #include "core/engine/audio_inputs.h"
+#include "core/engine/body.h"
 #include "core/engine/energy_watch.h"
 #include "core/engine/gestures.h"
 #include "core/engine/keyboard.h"
@@ -136,6 +138,7 @@ struct Engine::Player {
       case EventKind::panic:
         share.restart();
         variation.drop(all_channels);
+        mute_body();
         return keyboard.panic();
     }
   }
@@ -263,6 +266,10 @@ struct Engine::Player {
     if (event.index == all_sound_off) {
       keyboard.silence(channel);
       keyboard.forget_keys(reached);
+      if (std::none_of(voices.begin(), voices.end(),
+                       [](const Voice& voice) { return voice.is_live(); })) {
+        mute_body();  // no other channel plays it
+      }
     } else if (event.index == reset_all_controllers) {
       keyboard.reset_controllers(channel);
       release_by_pedal(channel);
@@ -295,6 +302,12 @@ struct Engine::Player {
     }
   }
 
+  void mute_body() {
+    if (body) {
+      body->mute();
+    }
+  }
+
   // Strikes the most recent voice. The force is scaled so that the displacement does not depend on
   // pitch.
   template <class T>
@@ -318,7 +331,17 @@ struct Engine::Player {
 
   // --- sound ---
 
-  // Plays as much of the segment as can be computed in one go. Returns its end.
+  // Plays as much of the segment as can be computed in one go, through the body if there is one.
+  // Returns its end.
+  std::size_t play_through(const Segment& segment) {
+    if (!body) {
+      return play(segment);
+    }
+    const std::size_t frames = play(body->start(segment));
+    body->play(segment, frames, parameters.values());
+    return segment.at + frames;
+  }
+
   std::size_t play(Segment segment) {
     if (voices.is_idle() && !playing.noise && !audio.find_sound(segment)) {
       audio.keep_last_samples(segment);
@@ -457,6 +480,9 @@ struct Engine::Player {
     };
     std::visit([&](const auto& b) { std::for_each(b.parts.begin(), b.parts.end(), count_modes); },
                bank);
+    if (body) {
+      body->add_to(meters);
+    }
     return meters;
   }
 
@@ -471,34 +497,35 @@ struct Engine::Player {
 
   // --- take-over ---
 
-  bool continue_from(const Player& from) {
-    const bool is_taken_over = std::visit(
+  bool can_continue_from(const Player& from) {
+    const bool may_take_over = std::visit(
         [&](auto& b) {
-          using Same = std::remove_reference_t<decltype(b)>;
-          const auto* const other = std::get_if<Same>(&from.bank);
-          return other != nullptr && take_over(b, *other, from.voices);
+          const auto* const other = std::get_if<std::remove_reference_t<decltype(b)>>(&from.bank);
+          return other != nullptr && can_take_over(b, *other, from.voices);
         },
         bank);
-    if (is_taken_over) {
-      keyboard.continue_from(from.keyboard);
-      parameters.continue_from(from.parameters);
-      gestures.continue_from(from.gestures);
-      lfos.continue_from(from.lfos);
-      variation.continue_from(from.variation);
-      notes = from.notes;
-      audio.continue_from(from.audio);
-      watch.continue_from(from.watch);
-      levels.continue_from(from.levels);
-      mixing.continue_from(from.mixing);
-      share.adopt(from.share);
-      since_update = from.since_update;
+    return may_take_over && body.has_value() == from.body.has_value() &&
+           (!body || body->can_continue_from(*from.body));
+  }
+
+  bool continue_from(const Player& from) {
+    if (!can_continue_from(from)) {
+      return false;
     }
-    return is_taken_over;
+    take_over_voices(from);
+    if (body) {
+      body->continue_from(*from.body);
+    }
+    return true;
   }
 
   bool renumber_from(const Player& from) {
-    if (from.voices.size() != voices.size() || !continue_from(from)) {
+    if (from.voices.size() != voices.size() || !can_continue_from(from)) {
       return false;
+    }
+    take_over_voices(from);
+    if (body) {
+      body->renumber_from(*from.body);
     }
     keyboard.renumber(playing.gain != 0.0 ? from.playing.gain / playing.gain : 1.0);
     for (std::size_t i = 0; i < machine.parameters.size(); ++i) {
@@ -507,6 +534,27 @@ struct Engine::Player {
       }
     }
     return true;
+  }
+
+  // Takes over everything but the body.
+  void take_over_voices(const Player& from) {
+    std::visit(
+        [&](auto& b) {
+          take_over(b, std::get<std::remove_reference_t<decltype(b)>>(from.bank), from.voices);
+        },
+        bank);
+    keyboard.continue_from(from.keyboard);
+    parameters.continue_from(from.parameters);
+    gestures.continue_from(from.gestures);
+    lfos.continue_from(from.lfos);
+    variation.continue_from(from.variation);
+    notes = from.notes;
+    audio.continue_from(from.audio);
+    watch.continue_from(from.watch);
+    levels.continue_from(from.levels);
+    mixing.continue_from(from.mixing);
+    share.adopt(from.share);
+    since_update = from.since_update;
   }
 
   const Machine machine;
@@ -527,6 +575,7 @@ struct Engine::Player {
   NoteShare share;
   Viewer viewer;
   std::uint64_t notes = 0;       // note-ons so far, the same in all engines that share them
+  std::optional<Body> body;      // empty: the voices themselves are heard
   std::size_t since_update = 0;  // frames, less than max_block_frames between segments
 };
 
@@ -538,6 +587,10 @@ Engine::Engine(Machine machine, Playing playing, Precision precision, Isa isa,
                                        progress, executor)) {}
 
 Engine::~Engine() = default;
+
+void Engine::set_body(std::unique_ptr<Engine> body, std::vector<SharedParameter> shared) {
+  player_->body.emplace(std::move(body), std::move(shared), player_->machine.channels);
+}
 
 void Engine::process(std::span<const Event> events, std::span<const double* const> inputs,
                      std::span<double* const> outputs, std::size_t frames) noexcept {
@@ -554,12 +607,16 @@ void Engine::process(std::span<const Event> events, std::span<const double* cons
     const std::size_t until =
         next < events.size() ? std::min<std::size_t>(frames, events[next].frame) : frames;
     const std::size_t before = at;
-    at = player_->play({.inputs = inputs,
-                        .outputs = outputs,
-                        .at = at,
-                        .frames = player_->variation.frames_left(until - at)});
+    at = player_->play_through({.inputs = inputs,
+                                .outputs = outputs,
+                                .at = at,
+                                .frames = player_->variation.frames_left(until - at)});
     player_->variation.advance(at - before);
   }
+}
+
+bool Engine::can_continue_from(const Engine& from) {
+  return player_->can_continue_from(*from.player_);
 }
 
 bool Engine::continue_from(const Engine& from) {
@@ -619,7 +676,8 @@ const Machine& Engine::machine() const {
 }
 
 int Engine::output_count() const {
-  return static_cast<int>(player_->machine.channels);
+  return player_->body ? player_->body->output_count()
+                       : static_cast<int>(player_->machine.channels);
 }
 
 EngineMeters Engine::meters() const {

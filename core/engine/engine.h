@@ -22,6 +22,12 @@ namespace ressort::engine {
 
 enum class Precision : std::uint8_t { float32, float64 };
 
+// A parameter of the body that follows a parameter of the voices.
+struct SharedParameter {
+  std::uint16_t index = 0;    // parameter of the voices
+  std::uint16_t of_body = 0;  // parameter of the body
+};
+
 // The constructor allocates all memory and throws what a Progress throws. No other function
 // allocates.
 class Engine {
@@ -33,16 +39,23 @@ class Engine {
   Engine(const Engine&) = delete;
   Engine& operator=(const Engine&) = delete;
 
+  // Makes the voices' outputs the audio inputs of another engine, whose outputs are heard instead.
+  // Called once, before the engine plays. [any thread but audio]
+  void set_body(std::unique_ptr<Engine> body, std::vector<SharedParameter> shared);
+
   // Plays `frames` samples. `events` are sorted by frame and lie within the block. `inputs`: audio
   // channels, null if absent. `outputs`: one for each of the model's channels, overwritten, always
   // finite. [audio] wait-free, O(frames * elements * awake voices)
   void process(std::span<const Event> events, std::span<const double* const> inputs,
                std::span<double* const> outputs, std::size_t frames) noexcept;
 
+  // Returns false if a kernel of `from` cannot reconstruct the positions of all masses. [audio]
+  // wait-free, O(awake voices * (nodes + modes * masses))
+  bool can_continue_from(const Engine& from);
+
   // Takes over the state of another engine of the same Machine in other forms, without a gap: the
-  // next sample is the one that `from` would have played. Returns false, and changes nothing, if a
-  // kernel of `from` cannot reconstruct the positions of all masses. [audio] wait-free,
-  // O(awake voices * (nodes + modes * masses))
+  // next sample is the one that `from` would have played. Returns false, and changes nothing,
+  // unless can_continue_from(). [audio] wait-free, as above
   bool continue_from(const Engine& from);
 
   // Takes over the state of an engine for which can_renumber() is true. Voices keep sounding, and

@@ -96,6 +96,7 @@ struct VelocityCurve {
 struct Playing {
   int voices = 1;
   double gain = 1.0;                // output per unit of position
+  double body_gain = 1.0;           // largest gain from the outputs to the sound that is heard
   bool bare = false;                // the network alone: no ramps, no smoothing, no sleep
   double damper_s = 0.0;            // T60 of a released voice; 0: it rings freely
   std::vector<CurvePoint> damper_keys;  // the same by key; replaces `damper_s`
@@ -133,12 +134,15 @@ struct Playing {
   const VoiceCurve* curve_of(std::size_t parameter) const {
     return parameter < curves.size() && curves[parameter] ? &*curves[parameter] : nullptr;
   }
+  // Returns the level that is heard per unit of position.
+  double heard_gain() const { return gain * body_gain; }
+
   double gain_of_loudest_key() const {
     double most_db = 0.0;
     for (const CurvePoint& point : keys_db) {
       most_db = std::max(most_db, point[1]);
     }
-    return gain * std::pow(10.0, most_db / 20.0);
+    return heard_gain() * std::pow(10.0, most_db / 20.0);
   }
 };
 

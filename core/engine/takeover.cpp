@@ -117,21 +117,24 @@ bool have_same_units(const Bank<T>& bank, const Bank<T>& from) {
 }  // namespace
 
 template <class T>
-bool take_over(Bank<T>& bank, const Bank<T>& from, const Voices& voices) {
-  if (!have_same_units(bank, from) ||
-      !std::all_of(from.parts.begin(), from.parts.end(),
-                   [&](const PartBank<T>& part) { return can_be_saved(part, voices, bank); })) {
-    return false;
-  }
+bool can_take_over(Bank<T>& bank, const Bank<T>& from, const Voices& voices) {
+  return have_same_units(bank, from) &&
+         std::all_of(from.parts.begin(), from.parts.end(),
+                     [&](const PartBank<T>& part) { return can_be_saved(part, voices, bank); });
+}
+
+template <class T>
+void take_over(Bank<T>& bank, const Bank<T>& from, const Voices& voices) {
   bank.filled_part = nullptr;
   bank.zero_velocities = 0;
   bank.each_group([&](PartBank<T>& part, const VoiceGroup& group) {
     take_over(bank, part, from.parts[group.part], group, voices);
   });
-  return true;
 }
 
-template bool take_over(Bank<float>&, const Bank<float>&, const Voices&);
-template bool take_over(Bank<double>&, const Bank<double>&, const Voices&);
+template bool can_take_over(Bank<float>&, const Bank<float>&, const Voices&);
+template bool can_take_over(Bank<double>&, const Bank<double>&, const Voices&);
+template void take_over(Bank<float>&, const Bank<float>&, const Voices&);
+template void take_over(Bank<double>&, const Bank<double>&, const Voices&);
 
 }  // namespace ressort::engine

@@ -6,10 +6,14 @@
 
 namespace ressort::engine {
 
-// Copies the state of all awake voices from `from` to `bank`, whose forms may differ. Returns
-// false, and changes nothing, if a kernel there cannot reconstruct the positions of all masses.
-// [audio] wait-free, O(awake voices * (nodes + modes * masses))
+// Returns false if a kernel of `from` cannot reconstruct the positions of all masses. Overwrites
+// the scratch memory of `bank`. [audio] wait-free, O(awake voices * (nodes + modes * masses))
 template <class T>
-bool take_over(Bank<T>& bank, const Bank<T>& from, const Voices& voices);
+bool can_take_over(Bank<T>& bank, const Bank<T>& from, const Voices& voices);
+
+// Copies the state of all awake voices from `from` to `bank`, whose forms may differ. Called if
+// can_take_over(). [audio] wait-free, as above
+template <class T>
+void take_over(Bank<T>& bank, const Bank<T>& from, const Voices& voices);
 
 }  // namespace ressort::engine

@@ -196,8 +196,8 @@ void Voices::advance_gains(std::size_t frames) {
 
 bool Voices::update(Voice& voice) {
   voice.decay.finish_approach();
-  const double peak =
-      voice.peak * playing_.gain * voice.decay.gain * std::max(voice.volume[0], voice.volume[1]);
+  const double peak = voice.peak * playing_.heard_gain() * voice.decay.gain *
+                      std::max(voice.volume[0], voice.volume[1]);
   voice.peak = 0.0;
   voice.level = std::max(peak, voice.level * level_kept_);
   const double gain = voice.decay.gain;

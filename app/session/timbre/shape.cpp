@@ -167,6 +167,10 @@ Result<Shaped> shape_timbre(const ShapeRequest& request, std::vector<TimbreTarge
   if (auto error = not_linear(scene)) {
     return *error;
   }
+  if (!preset.bodies.empty()) {
+    return Error{scene.name + " plays through " + preset.through.front() +
+                 ", whose part of the timbre is unknown here; shape a preset without 'through'"};
+  }
   if (scene.network.inputs.empty() || scene.network.outputs.empty()) {
     return Error{scene.name + " has no " +
                  (scene.network.inputs.empty() ? "input to strike" : "output to listen to")};

@@ -106,6 +106,13 @@ bool differs_in_start_values_only(const Scene& a, const Scene& b) {
       }
     }
   }
+  // Values of bodies are compared by the parameters of the scene, which include theirs.
+  for (std::size_t i = 0; i < std::min(preset.bodies.size(), a.preset.bodies.size()); ++i) {
+    const Network& before = a.preset.bodies[i].network;
+    if (has_same_parameters(before, preset.bodies[i].network)) {
+      preset.bodies[i].network.parameters = before.parameters;
+    }
+  }
   return network == a.network && preset == a.preset;
 }
 

@@ -178,6 +178,13 @@ std::string edit(std::string_view text, const PresetChanges& changes) {
   Editor editor(text);
   const toml::node* const model = root.get("model");
   editor.replace(*model, in_quotes(changes.model));
+  if (const toml::array* const through = root.get_as<toml::array>("through")) {
+    for (std::size_t i = 0; i < std::min(through->size(), changes.through.size()); ++i) {
+      if ((*through)[i].value_or(std::string()) != changes.through[i]) {
+        editor.replace((*through)[i], in_quotes(changes.through[i]));
+      }
+    }
+  }
   if (const toml::node* const gain = root.get("gain"); gain == nullptr) {
     editor.insert_after(*model, "gain = " + in_toml(changes.gain) + "\n");
   } else if (gain->value_or(0.0) != changes.gain) {

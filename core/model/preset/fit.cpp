@@ -45,7 +45,8 @@ std::string misfit(const Network& network, const ControlSetting& control) {
 }
 
 // Returns an error message for the curves of a parameter, or "".
-std::string misfit(const Network& network, const ParameterSetting& setting) {
+std::string misfit(const Network& network, const Preset& preset,
+                   const ParameterSetting& setting) {
   const int index = find_parameter(network, setting.name);
   if (index < 0) {
     return no_parameter(network, setting.name);
@@ -55,6 +56,13 @@ std::string misfit(const Network& network, const ParameterSetting& setting) {
   }
   if (network.parameters[static_cast<std::size_t>(index)].audio_input > 0) {
     return quoted(setting.name) + " is set by an audio input, so it has no curve; remove one of them";
+  }
+  for (const BodyModel& body : preset.bodies) {
+    if (find_parameter(body.network, setting.name) >= 0) {
+      return quoted(setting.name) + " is a parameter of " +
+             quoted(body.file.substr(body.file.rfind('/') + 1)) +
+             " in 'through', which all voices share, so it has no curve; rename one of them";
+    }
   }
   const auto is_read = [&](const Step& step) {
     return step.op == Op::parameter && step.index == static_cast<std::uint32_t>(index);
@@ -67,6 +75,36 @@ std::string misfit(const Network& network, const ParameterSetting& setting) {
              " sets the level of an output, which all voices share, so it has no curve; use "
              "'keys_db' for a level by key";
     }
+  }
+  return "";
+}
+
+// Returns whether an input or a parameter of the network uses this audio channel.
+bool hears_channel(const Network& network, int channel) {
+  const auto is_input = [&](const Input& input) { return input.number == channel; };
+  const auto is_parameter = [&](const Parameter& one) { return one.audio_input == channel; };
+  return std::any_of(network.inputs.begin(), network.inputs.end(), is_input) ||
+         std::any_of(network.parameters.begin(), network.parameters.end(), is_parameter);
+}
+
+// Returns an error message for outputs of the voices or of a body that drive nothing, or "".
+std::string misfit_of_bodies(const Network& network, const Preset& preset) {
+  const Network* from = &network;
+  std::string name = "the model";
+  for (const BodyModel& body : preset.bodies) {
+    const std::string file = quoted(body.file.substr(body.file.rfind('/') + 1));
+    for (const Output& output : from->outputs) {
+      if (!hears_channel(body.network, output.number)) {
+        const std::string number = std::to_string(output.number);
+        return name + " has an output " + number + ", but " + file + " in 'through' has no input " +
+               number + "; add @in" + number + " there, or remove the output";
+      }
+    }
+    if (from->outputs.empty() || body.network.outputs.empty()) {
+      return (from->outputs.empty() ? name : file) + " has no output, so 'through' is silent";
+    }
+    from = &body.network;
+    name = file;
   }
   return "";
 }
@@ -155,6 +193,17 @@ Network heard_where_touched(Network network, const Preset& preset) {
   return network;
 }
 
+Network with_body_parameters(Network network, const Preset& preset) {
+  for (const BodyModel& body : preset.bodies) {
+    for (const Parameter& parameter : body.network.parameters) {
+      if (parameter.audio_input == 0 && find_parameter(network, parameter.name) < 0) {
+        network.parameters.push_back(parameter);
+      }
+    }
+  }
+  return network;
+}
+
 Network with_fixed(Network network, const Preset& preset) {
   for (const std::string& label : preset.fixed) {
     fix(network, label);
@@ -172,7 +221,7 @@ std::vector<Error> find_preset_errors(const Network& network, const Preset& pres
     }
   }
   for (const ParameterSetting& setting : preset.parameters) {
-    if (std::string message = misfit(network, setting); !message.empty()) {
+    if (std::string message = misfit(network, preset, setting); !message.empty()) {
       found.push_back({std::move(message), setting.location.line, setting.location.column});
     }
   }
@@ -191,6 +240,10 @@ std::vector<Error> find_preset_errors(const Network& network, const Preset& pres
     if (std::string message = misfit(network, control); !message.empty()) {
       found.push_back({std::move(message), control.location.line, control.location.column});
     }
+  }
+  if (std::string message = misfit_of_bodies(network, preset); !message.empty()) {
+    found.push_back(
+        {std::move(message), preset.through_location.line, preset.through_location.column});
   }
   std::stable_sort(found.begin(), found.end(),
                    [](const Error& a, const Error& b) { return a.line < b.line; });

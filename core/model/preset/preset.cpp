@@ -888,6 +888,11 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
     read_texts("with", *with, reader, preset.with, 16,
                "up to 16 names of .mdl files: [\"Box.mdl\"]", is_model_name);
   }
+  if (const toml::node* const through = root.get("through")) {
+    preset.through_location = location_of(*through);
+    read_texts("through", *through, reader, preset.through, most_bodies,
+               "up to 8 names of .mdl files: [\"Soundboard.mdl\"]", is_model_name);
+  }
   reader.text("description", preset.description);
   reader.integer("voices", preset.voices, 1, max_voices);
   reader.number("gain", preset.gain, 0.0, 1e9);

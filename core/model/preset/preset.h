@@ -99,10 +99,20 @@ struct MorphSetting {
   bool operator==(const MorphSetting&) const = default;
 };
 
+// A model that the sum of all voices passes through, such as a soundboard.
+struct BodyModel {
+  std::string file;  // path, for messages
+  Network network;
+  bool operator==(const BodyModel&) const = default;
+};
+
 struct Preset {
   std::string model;                    // file name, next to the preset or in the models' folder
   SourceLocation model_location{1, 1};  // location of `model`
   std::vector<std::string> with;        // more models, appended to its text
+  std::vector<std::string> through;     // models that the sum of all voices passes through
+  SourceLocation through_location;
+  std::vector<BodyModel> bodies;        // the same, read by the loader
   std::vector<std::string> fixed;       // labels of elements whose stiffness keys do not change
   std::string description;              // one line
   int voices = 1;
@@ -147,6 +157,7 @@ struct Preset {
 inline constexpr int max_voices = 256;
 inline constexpr std::size_t most_morph_stops = 16;
 inline constexpr std::size_t most_lfos = 8;
+inline constexpr std::size_t most_bodies = 8;  // models of `through`
 inline constexpr int most_pitch_mode = 16;
 inline constexpr std::size_t max_preset_bytes = std::size_t{64} << 10;
 inline constexpr std::size_t most_preset_errors = 100;

@@ -8,6 +8,7 @@ namespace {
 constexpr PresetKey keys[] = {
     {"", "model", "text", "the model's file, `NAME.mdl`, beside the preset or in the models folder; required"},
     {"", "with", "[\"NAME.mdl\", ...]", "up to 16 more models that are read as one text with it, for example a guitar's box with its string"},
+    {"", "through", "[\"NAME.mdl\", ...]", "up to 8 models that the sum of all voices passes through in this order, each computed once: a soundboard, a spring reverb"},
     {"", "description", "text", "one line for the player"},
     {"", "voices", "1 to 256 (1)", "number of notes that sound at the same time"},
     {"", "gain", "0 to 1e9 (1)", "output per unit of position; a forte note should peak near -12 dBFS"},

@@ -77,6 +77,16 @@ TEST_CASE("a new parameter is added after the others", "[preset_edit]") {
                         "[parameters]\nM = { value = 1.0, range = [0.5, 2.0] }\n"));
 }
 
+TEST_CASE("models of 'through' are renamed one by one", "[preset_edit]") {
+  const std::string two =
+      "model = \"a.mdl\"\nthrough = [\n  \"b.mdl\",  # a box\n  \"c.mdl\"]\n"
+      "gain = 2.0\n";
+  const auto moved =
+      edit_preset(two, {.model = "a.mdl", .through = {"/x/b.mdl", "c.mdl"}, .gain = 2.0});
+  REQUIRE(moved);
+  CHECK(*moved == replaced(two, "b.mdl", "/x/b.mdl"));
+}
+
 TEST_CASE("a learned control replaces the controls of its controller", "[preset_edit]") {
   const ControlSetting learned{.source = ControlSource::controller,
                                .number = 1,

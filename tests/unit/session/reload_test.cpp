@@ -262,6 +262,28 @@ TEST_CASE("An error keeps the sound and is reported with its line and a caret", 
   CHECK(news.is_done);
 }
 
+TEST_CASE("A body that the voices pass through is watched", "[reload]") {
+  const auto body = [](const std::string& ring, const std::string& hz) {
+    return "@ring param " + ring + "\n@b body 1000. p\n@b1 mode @b " + hz +
+           " ring 1.\n@in1 frcInput [@b p]\n@out1 posOutput [@b p]\n";
+  };
+  const Folder folder;
+  folder.write("m.mdl", model_text());
+  folder.write("b.mdl", body("1.", "300."));
+  Stage stage(folder.write("p.toml", "through = [\"b.mdl\"]\n" + preset()));
+  const auto told = [&](const std::string& ring, const std::string& hz) {
+    return stage.after([&] { folder.write("b.mdl", body(ring, hz)); }).news;
+  };
+  CHECK(told("0.5", "300.") == "p: ring = 0.5");
+  CHECK(has(told("0.5", "310."), "p: loaded again"));
+  stage.play(9600);
+  stage.strike();
+  stage.play(4800);
+  CHECK(stage.peak(2400) > 0.0);
+  CHECK(has(told("0.5", "310.\n@b2 mode @b"), folder.file("b.mdl") + ":3:"));
+  CHECK(stage.heap_calls == 0);
+}
+
 TEST_CASE("A file is watched however it is written", "[reload]") {
   const Folder folder;
   folder.write("m.mdl", model_text());

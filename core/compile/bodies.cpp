@@ -1,0 +1,138 @@
+#include "core/compile/bodies.h"
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+#include "core/model/language/mdl.h"
+#include "core/model/preset/fit.h"
+
+namespace ressort::compile {
+namespace {
+
+// Returns the preset of a body: audio channel n drives input n.
+Preset body_preset(const Preset& preset, const Network& body) {
+  Preset own{
+      .gain = preset.gain, .keyboard = false, .third = preset.third, .budget = preset.budget};
+  own.bodies.assign(preset.bodies.begin() + 1, preset.bodies.end());
+  own.through_location = preset.through_location;
+  for (const ParameterSetting& setting : preset.parameters) {
+    if (find_parameter(body, setting.name) >= 0) {
+      own.parameters.push_back(setting);
+    }
+  }
+  for (const Input& input : body.inputs) {
+    own.controls.push_back({.source = ControlSource::audio,
+                            .number = input.number,
+                            .target = "in" + std::to_string(input.number)});
+  }
+  return own;
+}
+
+// Returns the error with the file of its line.
+Error in_file(const std::string& file, const Error& error) {
+  return error.line > 0
+             ? Error{to_string(
+                   Diagnostic{.line = error.line, .column = error.column, .message = error.message},
+                   file)}
+             : error;
+}
+
+const ParameterInfo* find_shared(const Compiled& body, const ParameterInfo& of_voices) {
+  for (const ParameterInfo& info : body.instrument.parameters) {
+    if (info.name == of_voices.name && info.audio_input == 0 && of_voices.audio_input == 0) {
+      return &info;
+    }
+  }
+  return nullptr;
+}
+
+std::vector<SharedParameter> shared_parameters(const Instrument& voices, const Compiled& body) {
+  std::vector<SharedParameter> shared;
+  for (std::size_t i = 0; i < voices.parameters.size(); ++i) {
+    if (const ParameterInfo* const info = find_shared(body, voices.parameters[i])) {
+      shared.push_back(
+          {.index = static_cast<std::uint16_t>(i),
+           .of_body = static_cast<std::uint16_t>(info - body.instrument.parameters.data())});
+    }
+  }
+  return shared;
+}
+
+}  // namespace
+
+Result<std::optional<Compiled>> compile_body(const CompileRequest& request, const Network& network,
+                                             std::span<const double> start,
+                                             std::size_t forms_before) {
+  if (request.preset.bodies.empty()) {
+    return std::optional<Compiled>();
+  }
+  const BodyModel& model = request.preset.bodies.front();
+  Preset rest;
+  rest.bodies.assign(request.preset.bodies.begin() + 1, request.preset.bodies.end());
+  Network body = with_body_parameters(model.network, rest);
+  for (Parameter& parameter : body.parameters) {
+    if (const int same = find_parameter(network, parameter.name);
+        same >= 0 && parameter.audio_input == 0) {
+      parameter.value = start[static_cast<std::size_t>(same)];
+    }
+  }
+  CompileOptions options = request.options;
+  options.voices = 1;
+  options.share = {};
+  options.find_gain = false;
+  const std::size_t before = std::min(forms_before, options.forms.size());
+  options.forms.erase(options.forms.begin(),
+                      options.forms.begin() + static_cast<std::ptrdiff_t>(before));
+  auto compiled = compile_network(body, body_preset(request.preset, body), options);
+  if (!compiled) {
+    return in_file(model.file, compiled.error());
+  }
+  return std::optional<Compiled>(*std::move(compiled));
+}
+
+StabilityCheck within_ranges_of(const Compiled& body, StabilityCheck voices) {
+  for (std::size_t i = 0; i < voices.parameters.size(); ++i) {
+    ParameterInfo& info = voices.parameters[i];
+    const ParameterInfo* const same = find_shared(body, info);
+    if (same == nullptr) {
+      continue;
+    }
+    info.minimum = std::max(info.minimum, same->minimum);
+    info.maximum = std::min(info.maximum, same->maximum);
+    info.safe = {std::max(info.safe.lowest, same->safe.lowest),
+                 std::min(info.safe.highest, same->safe.highest)};
+    info.is_raised = info.is_raised || same->is_raised;
+    info.is_lowered = info.is_lowered || same->is_lowered;
+    const auto index = static_cast<std::size_t>(same - body.instrument.parameters.data());
+    if (i < voices.limits.size() && index < body.stability.limits.size()) {
+      const Limits& limits = body.stability.limits[index];
+      voices.limits[i] = {std::max(voices.limits[i].lowest, limits.lowest),
+                          std::min(voices.limits[i].highest, limits.highest)};
+    }
+  }
+  return voices;
+}
+
+void add_body(Compiled& voices, Compiled body, const std::string& file) {
+  const std::string name = file.substr(file.rfind('/') + 1);
+  std::vector<SharedParameter> shared = shared_parameters(voices.instrument, body);
+  voices.instrument.outputs = body.instrument.outputs;
+  voices.engine->set_body(std::move(body.engine), std::move(shared));
+  for (Part& part : body.plan.parts) {
+    part.body = part.body.empty() ? name : part.body;
+    voices.plan.parts.push_back(std::move(part));
+  }
+  for (const std::string& note : body.plan.notes) {
+    const bool is_named = note.find(".mdl: ") != note.npos;
+    voices.plan.notes.push_back(is_named ? note : name + ": " + note);
+  }
+  voices.plan.accuracy = accuracy_of(voices.plan.parts);
+  voices.bodies.push_back({.file = file,
+                           .stability = std::move(body.stability),
+                           .hazard = std::move(body.schemes.hazard),
+                           .strong_bow = std::move(body.strong_bow)});
+  std::move(body.bodies.begin(), body.bodies.end(), std::back_inserter(voices.bodies));
+}
+
+}  // namespace ressort::compile
