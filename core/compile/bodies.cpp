@@ -1,9 +1,14 @@
 #include "core/compile/bodies.h"
 
 #include <algorithm>
+#include <bit>
+#include <cmath>
+#include <complex>
 #include <iterator>
+#include <numeric>
 #include <utility>
 
+#include "core/linear_algebra/fourier.h"
 #include "core/model/language/mdl.h"
 #include "core/model/preset/fit.h"
 
@@ -89,6 +94,87 @@ Result<std::optional<Compiled>> compile_body(const CompileRequest& request, cons
     return in_file(model.file, compiled.error());
   }
   return std::optional<Compiled>(*std::move(compiled));
+}
+
+BodyGain measure_gain(Compiled& body, const Progress& progress) {
+  constexpr double lowest_hz = 20.0;
+  constexpr double longest = 65536.0;  // frames, as `shortest`
+  constexpr double shortest = 2048.0;
+  constexpr double most_ns = 2.5e8;
+  constexpr double ns_of_a_step = 10.0;  // see Progress::spend()
+  constexpr std::size_t block = 256;     // a multiple of max_block_frames, as all that is played
+  constexpr double first_impulse = 1e-6;
+  constexpr double audible = 1e-2;  // far above the level at which a voice sleeps
+  progress.stage("measuring the gain of its body");
+  Engine& engine = *body.engine;
+  const Machine& machine = engine.machine();
+  double ns = 1.0;  // per sample
+  for (const Part& part : body.plan.parts) {
+    ns += part.estimated_ns;
+  }
+  const double inputs = static_cast<double>(std::max<std::size_t>(1, machine.inputs.size()));
+  const std::size_t frames = std::bit_floor(
+      static_cast<std::size_t>(std::clamp(most_ns / (ns * inputs), shortest, longest)));
+  const auto count = static_cast<std::size_t>(engine.output_count());
+  std::vector<std::vector<double>> heard(count, std::vector<double>(frames));
+  std::vector<double*> outputs(count);
+  const std::vector<double> silence(block);
+  std::vector<double> sound(block);
+  const auto play = [&](std::size_t channel, double impulse) {
+    double peak = 0.0;
+    std::vector<const double*> channels(channel + 1, silence.data());
+    channels[channel] = sound.data();
+    for (std::size_t at = 0; at < frames; at += block) {
+      progress.spend(static_cast<std::size_t>(block * ns / ns_of_a_step));
+      sound[0] = at == 0 ? impulse : 0.0;
+      for (std::size_t c = 0; c < count; ++c) {
+        outputs[c] = heard[c].data() + at;
+      }
+      engine.process({}, channels, outputs, block);
+      for (const double* const output : outputs) {
+        peak = std::accumulate(output, output + block, peak,
+                               [](double most, double y) { return std::max(most, std::fabs(y)); });
+      }
+    }
+    const Event panic{.kind = EventKind::panic};
+    std::vector<double> fade(block);
+    std::fill(outputs.begin(), outputs.end(), fade.data());
+    const auto fade_frames = static_cast<std::size_t>(0.02 * machine.rate_hz);
+    for (std::size_t at = 0; at < fade_frames; at += block) {
+      engine.process({&panic, at == 0 ? std::size_t{1} : std::size_t{0}}, {}, outputs, block);
+    }
+    return peak;
+  };
+  Fourier fourier(frames);
+  std::vector<std::complex<double>> bins(fourier.bins());
+  const auto first_bin = static_cast<std::size_t>(
+      std::ceil(lowest_hz / machine.rate_hz * static_cast<double>(frames)));
+  // [output][bin] sum over the inputs
+  std::vector<std::vector<double>> gains(count, std::vector<double>(bins.size()));
+  for (const ModelInput& input : machine.inputs) {
+    const auto channel = static_cast<std::size_t>(input.number - 1);
+    double impulse = first_impulse;
+    if (const double peak = play(channel, impulse); peak > 0.0 && peak < audible) {
+      impulse /= peak;
+      play(channel, impulse);
+    }
+    for (std::size_t c = 0; c < count; ++c) {
+      fourier.forward(heard[c], bins);
+      std::transform(
+          bins.begin(), bins.end(), gains[c].begin(), gains[c].begin(),
+          [&](std::complex<double> bin, double sum) { return sum + std::abs(bin) / impulse; });
+    }
+  }
+  BodyGain most{0.0, 0.0};
+  for (const std::vector<double>& gain : gains) {
+    double squares = 0.0;
+    for (std::size_t bin = first_bin; bin < gain.size(); ++bin) {
+      most.largest = std::max(most.largest, gain[bin]);
+      squares += gain[bin] * gain[bin];
+    }
+    most.mean = std::max(most.mean, std::sqrt(squares / static_cast<double>(gain.size())));
+  }
+  return most.largest > 0.0 && std::isfinite(most.largest) ? most : BodyGain();
 }
 
 StabilityCheck within_ranges_of(const Compiled& body, StabilityCheck voices) {

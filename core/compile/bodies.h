@@ -18,6 +18,17 @@ Result<std::optional<Compiled>> compile_body(const CompileRequest& request, cons
                                              std::span<const double> start,
                                              std::size_t forms_before);
 
+// Gain from the voices' outputs, all in phase, to an output of the last body.
+struct BodyGain {
+  double largest = 1.0;  // at any frequency from 20 Hz
+  double mean = 1.0;     // for white noise
+};
+
+// Measures the gain by the response to impulses of up to 1.5 s. Takes about a quarter of a second
+// for a large body. Then the body rests at its start. 1 for a body without a response. [any thread
+// but audio]
+BodyGain measure_gain(Compiled& body, const Progress& progress);
+
 // Narrows the ranges of the parameters that the voices share with the body to those of the body.
 StabilityCheck within_ranges_of(const Compiled& body, StabilityCheck voices);
 

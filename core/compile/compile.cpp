@@ -213,15 +213,12 @@ Result<Compiled> compile_by_stages(const CompileRequest& request) {
                                 options.executor, options.most_bytes)) {
     return *std::move(error);
   }
-  // The voices move the body by their outputs as they are. The last body has the preset's gain.
-  const double body_gain =
-      *body ? find_largest_gain((*body)->engine->machine(), options.isa, progress) *
-                  (*body)->heard_gain
-            : 1.0;
+  const BodyGain body_gain = *body ? measure_gain(**body, progress) : BodyGain();
   const auto playing_with = [&](int voices, double gain) {
     Playing playing = make_playing(network, preset, proof, keys, options.bare, voices, gain);
     playing.share = options.share;
-    playing.body_gain = body_gain;
+    playing.body_gain = body_gain.largest;
+    playing.mean_body_gain = body_gain.mean;
     return playing;
   };
   std::optional<double> factor = 1.0;  // factor on the preset's gain
@@ -231,14 +228,15 @@ Result<Compiled> compile_by_stages(const CompileRequest& request) {
         find_gain(planned.machine, playing_with(1, 1.0), options.precision, options.isa, progress);
   }
   const double gain = preset.gain * factor.value_or(1.0);
+  // The voices move the body by their outputs as they are. The last body has the preset's gain.
   const double voice_gain = *body ? 1.0 : gain;
-  const double heard_gain = voice_gain * body_gain;
 
   BowCheck bows = check_bows(request, network, schemes, *analysis, proof, planned.machine, keys);
   std::vector<std::string> notes =
       make_notes(request, reduced, schemes, culled, proof, keys, !factor, bows);
   progress.stage("making its voices");
-  Instrument instrument = make_instrument(network, preset, proof, keys, request.voices, heard_gain);
+  Instrument instrument = make_instrument(network, preset, proof, keys, request.voices,
+                                          voice_gain * body_gain.mean);
   instrument.gain = gain;
   instrument.struck = find_struck(request.written, planned.machine);
   std::optional<Accuracy> accuracy = accuracy_of(planned.parts);
@@ -252,8 +250,7 @@ Result<Compiled> compile_by_stages(const CompileRequest& request) {
                .notes = std::move(notes)},
       .stability = proof.stability,
       .schemes = schemes,
-      .strong_bow = std::move(bows.error),
-      .heard_gain = heard_gain};
+      .strong_bow = std::move(bows.error)};
   if (*body) {
     add_body(compiled, **std::move(body), preset.bodies.front().file);
   }

@@ -30,8 +30,7 @@ struct Compiled {
   Plan plan;
   StabilityCheck stability;  // the caller decides whether an unstable engine may play
   Schemes schemes;
-  std::optional<Error> strong_bow;  // a bow too strong for its time steps, at the model's line
-  double heard_gain = 1.0;          // level that is heard per unit of position
+  std::optional<Error> strong_bow;   // a bow too strong for its time steps, at the model's line
   std::vector<CompiledBody> bodies;  // bodies of the preset's `through`, in their order
 };
 

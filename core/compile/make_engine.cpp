@@ -1,9 +1,7 @@
 #include "core/compile/make_engine.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <complex>
 #include <cstdio>
 #include <string>
 #include <vector>
@@ -12,7 +10,6 @@
 #include "core/kernels/domains/executor.h"
 #include "core/kernels/passive/clusters.h"
 #include "core/kernels/registry.h"
-#include "core/linear_algebra/fourier.h"
 
 namespace ressort::compile {
 namespace {
@@ -23,34 +20,6 @@ std::string in_bytes(std::uint64_t bytes) {
   std::snprintf(text, sizeof text, mega < 1e3 ? "%.0f MB" : "%.1f GB",
                 mega < 1e3 ? mega : mega / 1e3);
   return text;
-}
-
-constexpr double most_steps_at_worst = 1e9;
-
-// The work of one voice, in steps of a mass per sample.
-struct Work {
-  double steps = 1.0;
-  double at_worst = 1.0;
-
-  // Returns the length of a block after which a progress may stop the work.
-  std::size_t block() const {
-    constexpr double most_steps_of_block = 4e6;
-    return static_cast<std::size_t>(std::clamp(most_steps_of_block / at_worst, 1.0, 256.0));
-  }
-};
-
-Work work_of(const Machine& machine) {
-  // Passive links are solved together by Newton's method.
-  constexpr double steps_of_shared_link = 200.0;
-  Work work;
-  for (const Program& program : machine.parts) {
-    work.at_worst += worst_steps(program);
-    work.steps += program.moving;
-    for (const Cluster& cluster : passive_tables(program).clusters) {
-      work.steps += steps_of_shared_link * cluster.count;
-    }
-  }
-  return work;
 }
 
 }  // namespace
@@ -96,15 +65,28 @@ std::optional<double> find_gain(const Machine& machine, const Playing& playing, 
                                 Isa isa, const Progress& progress) {
   constexpr double forte = 0.8;
   constexpr double most_steps = 4e6;
-  const Work work = work_of(machine);
+  constexpr double most_steps_at_worst = 1e9;
+  constexpr double most_steps_of_block = 4e6;
+  // Passive links are solved together by Newton's method.
+  constexpr double steps_of_shared_link = 200.0;
+  double steps = 1.0;  // steps per sample
+  double at_worst = 1.0;
+  for (const Program& program : machine.parts) {
+    at_worst += worst_steps(program);
+    steps += program.moving;
+    for (const Cluster& cluster : passive_tables(program).clusters) {
+      steps += steps_of_shared_link * cluster.count;
+    }
+  }
   const double least = 0.05 * machine.rate_hz;
-  const double most = std::min(machine.rate_hz, most_steps_at_worst / work.at_worst);
+  const double most = std::min(machine.rate_hz, most_steps_at_worst / at_worst);
   if (most < least) {
     return std::nullopt;
   }
   Engine engine(machine, playing, precision, isa, progress);
-  const auto frames = static_cast<std::size_t>(std::clamp(most_steps / work.steps, least, most));
-  const std::size_t block = work.block();
+  const auto frames = static_cast<std::size_t>(std::clamp(most_steps / steps, least, most));
+  const auto block =
+      static_cast<std::size_t>(std::clamp(most_steps_of_block / at_worst, 1.0, 256.0));
   std::vector<std::vector<double>> channels(machine.channels, std::vector<double>(block));
   std::vector<double*> outputs;
   for (std::vector<double>& channel : channels) {
@@ -113,7 +95,7 @@ std::optional<double> find_gain(const Machine& machine, const Playing& playing, 
   const Event note{.kind = EventKind::note_on, .index = 60, .value = forte};
   double peak = 0.0;
   for (std::size_t at = 0; at < frames; at += block) {
-    progress.spend(static_cast<std::size_t>(static_cast<double>(block) * work.at_worst));
+    progress.spend(static_cast<std::size_t>(static_cast<double>(block) * at_worst));
     engine.process({&note, at == 0 ? std::size_t{1} : std::size_t{0}}, {}, outputs, block);
     for (const std::vector<double>& channel : channels) {
       for (const double sample : channel) {
@@ -122,62 +104,6 @@ std::optional<double> find_gain(const Machine& machine, const Playing& playing, 
     }
   }
   return peak > 1e-12 ? found_gain_peak / peak : 1.0;
-}
-
-double find_largest_gain(const Machine& machine, Isa isa, const Progress& progress) {
-  constexpr double impulse = 1e-3;
-  constexpr double lowest_hz = 20.0;
-  constexpr double longest = 65536.0;  // frames
-  constexpr double shortest = 2048.0;
-  constexpr double most_steps = 1.6e7;
-  const Work work = work_of(machine);
-  const double wanted = std::min(
-      most_steps /
-          (work.steps * static_cast<double>(std::max<std::size_t>(1, machine.inputs.size()))),
-      most_steps_at_worst / work.at_worst);
-  const std::size_t frames =
-      std::bit_floor(static_cast<std::size_t>(std::clamp(wanted, shortest, longest)));
-  Fourier fourier(frames);
-  std::vector<std::complex<double>> bins(fourier.bins());
-  const auto first_bin = static_cast<std::size_t>(
-      std::ceil(lowest_hz / machine.rate_hz * static_cast<double>(frames)));
-  // [output][bin] sum over the inputs
-  std::vector<std::vector<double>> gains(machine.channels, std::vector<double>(bins.size()));
-  const std::size_t block = work.block();
-  for (std::size_t i = 0; i < machine.inputs.size(); ++i) {
-    Playing playing{.bare = true};
-    playing.controls.push_back({.source = Source::audio,
-                                .gesture = Gesture::position,
-                                .target = static_cast<std::uint16_t>(i),
-                                .settings = {.high = 1.0}});
-    Engine engine(machine, std::move(playing), Precision::float64, isa, progress);
-    std::vector<std::vector<double>> heard(machine.channels, std::vector<double>(frames));
-    std::vector<double> sound(block);
-    std::vector<double*> outputs(machine.channels);
-    for (std::size_t at = 0; at < frames; at += block) {
-      const std::size_t count = std::min(block, frames - at);
-      progress.spend(static_cast<std::size_t>(static_cast<double>(count) * work.at_worst));
-      sound[0] = at == 0 ? impulse : 0.0;
-      for (std::size_t c = 0; c < outputs.size(); ++c) {
-        outputs[c] = heard[c].data() + at;
-      }
-      const double* const input = sound.data();
-      engine.process({}, {&input, 1}, outputs, count);
-    }
-    for (std::size_t c = 0; c < heard.size(); ++c) {
-      fourier.forward(heard[c], bins);
-      for (std::size_t bin = 0; bin < bins.size(); ++bin) {
-        gains[c][bin] += std::abs(bins[bin]) / impulse;
-      }
-    }
-  }
-  double most = 0.0;
-  for (const std::vector<double>& gain : gains) {
-    for (std::size_t bin = first_bin; bin < gain.size(); ++bin) {
-      most = std::max(most, gain[bin]);
-    }
-  }
-  return most > 0.0 && std::isfinite(most) ? most : 1.0;
 }
 
 std::unique_ptr<Engine> make_engine(Machine machine, Playing playing, Precision precision, Isa isa,

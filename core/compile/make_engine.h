@@ -30,11 +30,6 @@ inline constexpr double found_gain_peak = 0.5;
 std::optional<double> find_gain(const Machine& machine, const Playing& playing, Precision precision,
                                 Isa isa, const Progress& progress);
 
-// Returns the largest gain of the network from its inputs to an output at any frequency from 20 Hz,
-// with all inputs in phase: by its response to impulses of up to 1.5 s. Returns 1 for a network
-// without a response. Plays about 16 million steps of a mass. [any thread but audio]
-double find_largest_gain(const Machine& machine, Isa isa, const Progress& progress);
-
 // O(voices * elements) in time and memory. [any thread but audio]
 std::unique_ptr<Engine> make_engine(Machine machine, Playing playing, Precision precision, Isa isa,
                                     const Progress& progress, Executor* executor);

@@ -7,7 +7,9 @@ namespace ressort::engine {
 
 Mixing::Mixing(const Playing& playing)
     : gain_(playing.gain),
-      bound_(playing.bare ? runaway : std::min(runaway, runaway_level / playing.heard_gain())) {}
+      bound_(playing.bare
+                 ? runaway
+                 : std::min(runaway, runaway_level / (playing.gain * playing.mean_body_gain))) {}
 
 template <class T>
 void Mixing::add(Bank<T>& bank, const VoiceGroup& group, const Segment& segment, Voices& voices,

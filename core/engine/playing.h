@@ -96,7 +96,8 @@ struct VelocityCurve {
 struct Playing {
   int voices = 1;
   double gain = 1.0;                // output per unit of position
-  double body_gain = 1.0;           // largest gain from the outputs to the sound that is heard
+  double body_gain = 1.0;           // from the outputs to what is heard, at the loudest frequency
+  double mean_body_gain = 1.0;      // the same for white noise
   bool bare = false;                // the network alone: no ramps, no smoothing, no sleep
   double damper_s = 0.0;            // T60 of a released voice; 0: it rings freely
   std::vector<CurvePoint> damper_keys;  // the same by key; replaces `damper_s`
