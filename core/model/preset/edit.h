@@ -13,10 +13,10 @@ namespace ressort::model {
 
 struct PresetChanges {
   std::string model;  // name or path of the model, relative to the new file
-  std::vector<std::string> through = {};  // the same for the models of `through`; empty: unchanged
   double gain = 1.0;
   std::vector<ParameterSetting> parameters;  // changed or new
   std::vector<ControlSetting> learned;       // each replaces all controls of its controller
+  std::vector<std::string> through = {};  // the models of `through`, as `model`; empty: unchanged
 };
 
 // Applies changes to a preset's text, and keeps its comments and all other keys. Fails if the text

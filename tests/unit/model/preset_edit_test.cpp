@@ -82,7 +82,7 @@ TEST_CASE("models of 'through' are renamed one by one", "[preset_edit]") {
       "model = \"a.mdl\"\nthrough = [\n  \"b.mdl\",  # a box\n  \"c.mdl\"]\n"
       "gain = 2.0\n";
   const auto moved =
-      edit_preset(two, {.model = "a.mdl", .through = {"/x/b.mdl", "c.mdl"}, .gain = 2.0});
+      edit_preset(two, {.model = "a.mdl", .gain = 2.0, .through = {"/x/b.mdl", "c.mdl"}});
   REQUIRE(moved);
   CHECK(*moved == replaced(two, "b.mdl", "/x/b.mdl"));
 }
