@@ -44,10 +44,10 @@ Stereo play(Player& player, int key, int turn, const std::vector<TimedEvent>& ev
   return sound;
 }
 
-Stereo sum_of(Stereo a, const Stereo& b) {
+Stereo sum_of(Stereo a, const Stereo& b, double sign) {
   for (std::size_t channel = 0; channel < a.channels.size(); ++channel) {
     for (std::size_t n = 0; n < a.size(); ++n) {
-      a.channels[channel][n] += b.channels[channel][n];
+      a.channels[channel][n] += sign * b.channels[channel][n];
     }
   }
   return a;
@@ -63,17 +63,20 @@ struct Lowest {
 Lowest lowest_of(Player& player, int key, std::vector<TimedEvent> events) {
   const TimedEvent strike{soft_s, note_on(key, soft)};
   const Stereo alone = play(player, key, 0, events);
-  const Stereo sum = sum_of(alone, play(player, key, 1, {strike}));
+  const Stereo second = play(player, key, 1, {strike});
+  // A pluck from the other side has the opposite sign.
+  const Stereo sums[] = {sum_of(alone, second, 1.0), sum_of(alone, second, -1.0)};
   events.push_back(strike);
   const Stereo both = play(player, key, 0, events);
   Lowest lowest;
   for (double at_s = soft_s; at_s <= soft_s + watched_s - window_s; at_s += 0.01) {
-    const double alone_db =
-        0.5 * decibels(power_of(both, at_s) / std::max(1e-30, power_of(alone, at_s)));
-    const double sum_db =
-        0.5 * decibels(power_of(both, at_s) / std::max(1e-30, power_of(sum, at_s)));
+    const auto relative_db = [&](const Stereo& sound) {
+      return 0.5 * decibels(power_of(both, at_s) / std::max(1e-30, power_of(sound, at_s)));
+    };
+    const double alone_db = relative_db(alone);
     lowest.alone_db = std::min(lowest.alone_db, alone_db);
-    lowest.least_db = std::min(lowest.least_db, std::max(alone_db, sum_db));
+    lowest.least_db =
+        std::min(lowest.least_db, std::max({alone_db, relative_db(sums[0]), relative_db(sums[1])}));
   }
   return lowest;
 }
