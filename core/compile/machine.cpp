@@ -96,6 +96,7 @@ class ProgramMaker {
     OutputSlot slot{.channel = static_cast<std::uint32_t>(output.number - 1),
                     .node = node_[output.mass],
                     .is_force = output.is_force,
+                    .derivative = output.derivative,
                     .origin = index};
     if (output.level != no_argument) {
       const Formula& formula = formula_of(output.level);

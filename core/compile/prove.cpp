@@ -52,7 +52,9 @@ std::vector<std::optional<RestBound>> make_rest_bounds(const Network& network,
     for (const OutputSlot& slot : program.outputs) {
       const Output& output = network.outputs[slot.origin];
       const double level = level_value(network, output, machine.parameters);
-      const double compliance = compliance_of[output.mass] * level * level;
+      // A difference of two positions is at most twice the larger one.
+      const double swing = level * std::pow(2.0 / machine.rate_ratio, output.derivative);
+      const double compliance = compliance_of[output.mass] * swing * swing;
       const bool is_level_fixed =
           output.level == no_argument || is_constant(network.arguments[output.level]);
       is_known = is_known && is_level_fixed && !slot.is_force && std::isfinite(compliance);

@@ -27,6 +27,21 @@ struct PartBank {
       width = kernels[0]->width();
     } while (kernels.size() * width < voices);
     last.resize(kernels.size() * row());
+    before.resize(last.size());
+    slope.resize(last.size());
+    for (std::size_t voice = 0; voice < kernels.size() * width; ++voice) {
+      restart_slopes(voice);
+    }
+  }
+  // Sets the positions and velocities before the first sample of a voice, for outputs of
+  // derivatives. [audio]
+  void restart_slopes(std::size_t voice) {
+    for (std::size_t output = 0; output < program.outputs.size(); ++output) {
+      const std::uint32_t node = program.outputs[output].node;
+      const std::size_t at = voice / width * row() + output * width + voice % width;
+      before[at] = static_cast<T>(program.position[node]);
+      slope[at] = static_cast<T>(program.velocity[node] / program.rate_ratio);
+    }
   }
   T* last_of(std::size_t voice) { return last.data() + voice / width * row(); }
   // size of an output row of one kernel
@@ -38,6 +53,9 @@ struct PartBank {
   std::size_t width = 1;
   std::vector<std::unique_ptr<Kernel<T>>> kernels;  // [voice / width]
   Aligned<T> last;                                  // [kernel][output][lane] last sample
+  // The position and the velocity in the last sample, for outputs of derivatives.
+  Aligned<T> before;  // [kernel][output][lane]
+  Aligned<T> slope;   // [kernel][output][lane]
 };
 
 // The kernels of a part that several threads step. Each has its own buffers.

@@ -87,6 +87,7 @@ void EnergyWatch::freeze_unstable(PartBank<T>& part, const T* row, std::size_t l
                                   Voices& voices) {
   voices.mark_unstable(voices[lane]);
   freeze(row, part.width, lane, p);
+  part.restart_slopes(lane);
   part.of(lane).reset(lane % part.width);  // NaN and infinity would slow down the other lanes
 }
 

@@ -385,6 +385,7 @@ struct Engine::Player {
         mixing.add_frozen(part.program, group, segment, voices, watch);
       }
       if (has_stepped) {
+        differentiate(b, group, segment.frames);
         levels.apply(b, group, segment.frames);
         mixing.add(b, group, segment, voices, watch);
       }

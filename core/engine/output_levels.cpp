@@ -10,6 +10,30 @@ constexpr double ramp_s = 0.025;
 
 }  // namespace
 
+template <class T>
+void differentiate(Bank<T>& bank, const VoiceGroup& group, std::size_t frames) {
+  PartBank<T>& part = bank.parts[group.part];
+  const T per_reference = static_cast<T>(1.0 / part.program.rate_ratio);
+  for (std::size_t output = 0; output < part.program.outputs.size(); ++output) {
+    const int derivative = part.program.outputs[output].derivative;
+    if (derivative == 0) {
+      continue;
+    }
+    const std::size_t at = group.first / part.width * part.row() + output * part.width;
+    for (std::size_t n = 0; n < frames; ++n) {
+      T* const row = bank.outputs.data() + n * part.row() + output * part.width;
+      for (std::size_t lane = 0; lane < part.width; ++lane) {
+        T& before = part.before[at + lane];
+        T& slope = part.slope[at + lane];
+        const T velocity = (row[lane] - before) * per_reference;
+        before = row[lane];
+        row[lane] = derivative == 1 ? velocity : (velocity - slope) * per_reference;
+        slope = velocity;
+      }
+    }
+  }
+}
+
 OutputLevels::OutputLevels(const Machine& machine, const Playing& playing)
     : ramp_frames_(playing.bare ? 0
                                 : static_cast<std::size_t>(std::ceil(ramp_s * machine.rate_hz))) {
@@ -66,6 +90,8 @@ void OutputLevels::advance(std::size_t frames) {
   }
 }
 
+template void differentiate(Bank<float>&, const VoiceGroup&, std::size_t);
+template void differentiate(Bank<double>&, const VoiceGroup&, std::size_t);
 template void OutputLevels::apply(Bank<float>&, const VoiceGroup&, std::size_t) const;
 template void OutputLevels::apply(Bank<double>&, const VoiceGroup&, std::size_t) const;
 

@@ -1,4 +1,4 @@
-// core/engine: the level formulas of the model's outputs.
+// core/engine: the derivatives and the level formulas of the model's outputs.
 #pragma once
 
 #include <cstddef>
@@ -10,6 +10,12 @@
 #include "core/engine/voices.h"
 
 namespace ressort::engine {
+
+// Replaces the positions of a kernel that has stepped by velocities or accelerations, where an
+// output asks for them: differences of successive samples, in units per sample at the reference
+// rate. [audio] wait-free
+template <class T>
+void differentiate(Bank<T>& bank, const VoiceGroup& group, std::size_t frames);
 
 // All functions but the constructor: [audio] wait-free, O(outputs that have a level).
 class OutputLevels {

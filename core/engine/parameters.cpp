@@ -121,6 +121,7 @@ void Parameters::apply(Bank<T>& bank, const Voices& voices, EnergyWatch& watch) 
       if (voice.is_new) {
         watch.reset(lane, group.part);
         kernel.reset(lane - group.first);
+        part.restart_slopes(lane);
       }
       watch.mark_driven(voice, lane, group.part);
       const bool ramped = !voice.is_new && !playing_.bare;

@@ -22,7 +22,8 @@ bool is_same(const Program& a, const Program& b) {
          a.audio_parameters == b.audio_parameters &&
          is_same(a.outputs, b.outputs,
                  [](const OutputSlot& output) {
-                   return std::tuple(output.channel, output.node, output.is_force);
+                   return std::tuple(output.channel, output.node, output.is_force,
+                                     output.derivative);
                  }) &&
          is_same(a.coefficients, b.coefficients,
                  [](const Coefficient& c) { return std::tuple(c.unit, c.is_fixed, c.mode); });

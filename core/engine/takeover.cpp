@@ -97,6 +97,14 @@ void take_over(Bank<T>& bank, PartBank<T>& part, const PartBank<T>& from, const 
                .audio = bank.audio.data(),
                .outputs = bank.outputs.data()});
   std::copy_n(bank.outputs.data(), part.row(), part.last_of(group.first));
+  const std::size_t first = group.first / part.width * part.row();
+  std::copy_n(bank.outputs.data(), part.row(), part.before.data() + first);
+  for (std::size_t lane = group.first; lane < group.end; ++lane) {
+    for (std::size_t output = 0; output < program.outputs.size(); ++output) {
+      part.slope[first + output * part.width + lane - group.first] =
+          from.slope[lane / from.width * from.row() + output * from.width + lane % from.width];
+    }
+  }
   coefficients.ramp_frames = ramp_frames;
 }
 

@@ -196,11 +196,12 @@ struct Input {
   bool operator==(const Input&) const = default;
 };
 
-// Output N of the model: the position of a mass, or the force on it, times a level. Outputs with
-// the same number are added.
+// Output N of the model: the position of a mass, its velocity or acceleration, or the force on it,
+// times a level. Outputs with the same number are added.
 struct Output {
   int number = 1;
   bool is_force = false;
+  std::uint8_t derivative = 0;  // of the position: 1 is the velocity, 2 the acceleration
   std::uint32_t mass = 0;
   ArgumentId level = no_argument;  // none: 1
   SourceLocation location;

@@ -687,7 +687,11 @@ std::string faust_header(const Network& network, std::span<const std::string> ma
   for (const Output& output : network.outputs) {
     std::string& sum = heard[static_cast<std::size_t>(output.number - 1)];
     sum += (sum.empty() ? "" : ", ") +
-           ((output.is_force ? "force on " : "position of ") + masses[output.mass]);
+           ((output.is_force             ? "force on "
+             : output.derivative == 0 ? "position of "
+             : output.derivative == 1 ? "velocity of "
+                                      : "acceleration of ") +
+            masses[output.mass]);
   }
   for (std::size_t n = 0; n < heard.size(); ++n) {
     text += "// output " + std::to_string(n + 1) + ": " +
@@ -1173,7 +1177,7 @@ class Writer {
     return "(" + faust_sum(terms) + ")";
   }
 
-  Words outputs() const {
+  Words outputs() {
     Words words(static_cast<std::size_t>(output_count(network_)));
     for (const Output& output : network_.outputs) {
       const std::string& name = mass_[output.mass];
@@ -1186,6 +1190,14 @@ class Writer {
           for (const std::string& input : pushes_[pushed]) {
             word += felt(pushed, output.mass, input);
           }
+        }
+      }
+      if (output.derivative > 0) {
+        used_.insert("changed");
+        const double start = network_.masses[output.mass].position;
+        word = start == 0.0 ? word : "(" + word + " - " + faust_number(start) + ")";
+        for (int i = 0; i < output.derivative; ++i) {
+          word = "changed(" + word + ")";
         }
       }
       if (output.level != no_argument) {

@@ -122,6 +122,7 @@ with {
 };
 hat(i, p) = max(0.0, 1.0 - abs(p - i));
 along(n, u) = (n - 1.0)*max(0.0, min(1.0, u));
+changed(x) = (x - x')/r;
 // The force g(x) at the x that solves x + gamma g(x) = free between `far` and `free`: `count` steps
 // of Newton's method, with bisection where a step would leave the bracket or g falls too steeply.
 between(count, g, far, start, free, gamma) =

@@ -165,9 +165,12 @@ void Reader::add_output(Line& line) {
       }
     }
   }
+  const std::string_view word = line.keyword->word;
+  const int derivative = word == "velOutput" ? 1 : word == "accOutput" ? 2 : 0;
   if (number && mass) {
     out_.network.outputs.push_back({.number = *number,
                                     .is_force = line.keyword->element == Element::force_output,
+                                    .derivative = static_cast<std::uint8_t>(derivative),
                                     .mass = *mass,
                                     .level = level,
                                     .location = {line.number, line.label.column}});

@@ -31,6 +31,8 @@ constexpr Keyword fixed[] = {
     {"frcInput",           Element::force_input,     1, 0, 0, false, "@MASS"},
     {"forceInput",         Element::force_input,     1, 0, 0, false, "@MASS"},
     {"posOutput",          Element::position_output, 1, 0, 1, false, "@MASS [LEVEL]"},
+    {"velOutput",          Element::position_output, 1, 0, 1, false, "@MASS [LEVEL]"},
+    {"accOutput",          Element::position_output, 1, 0, 1, false, "@MASS [LEVEL]"},
     {"frcOutput",          Element::force_output,    1, 0, 1, false, "@MASS [LEVEL]"},
 };
 // clang-format on

@@ -293,7 +293,9 @@ class Printer {
       const std::string end =
           " " + reference(output.mass) +
           (output.level == no_argument ? std::string() : argument(output.level));
-      line("out" + std::to_string(output.number), output.is_force ? "frcOutput" : "posOutput", end);
+      const char* const words[] = {"posOutput", "velOutput", "accOutput"};
+      line("out" + std::to_string(output.number),
+           output.is_force ? "frcOutput" : words[output.derivative], end);
     }
   }
 
