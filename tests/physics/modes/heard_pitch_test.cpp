@@ -53,7 +53,7 @@ void check_keys(const std::string& name, double rate_hz, std::initializer_list<i
 }
 
 TEST_CASE("shipped instruments sound within a cent of their keys' pitch", "[heard_pitch]") {
-  for (const char* const name : {"Piano", "Marimba", "Glockenspiel", "BassGuitar", "ElectricGuitar",
+  for (const char* const name : {"Harp", "Marimba", "Glockenspiel", "BassGuitar", "ElectricGuitar",
                                  "PolyTriangle", "IPlayTheTriangle", "PluckedHarmonics",
                                  "Resonator", "SixStructures", "ChurchBell", "Vibraphone"}) {
     check_keys(name, 48000.0, {45, 69});
@@ -71,9 +71,8 @@ TEST_CASE("all instruments sound in tune over the keyboard at three rates",
                                    "Guitar",         "HandBell",         "Harp",
                                    "Harpsichord",    "IPlayTheTriangle", "LargeTriangleMesh",
                                    "MajorBell",      "Marimba",          "MarimbaTube",
-                                   "Piano",          "PluckedHarmonics", "PolyTriangle",
-                                   "Resonator",      "SixStructures",    "SteelDrum",
-                                   "Vibraphone"}) {
+                                   "PluckedHarmonics", "PolyTriangle",   "Resonator",
+                                   "SixStructures",  "SteelDrum",        "Vibraphone"}) {
       check_keys(name, rate_hz, {36, 45, 57, 69, 81, 93});
     }
   }
