@@ -162,14 +162,102 @@ int repeated(std::span<const Step> formula, const ParameterBox& box) {
   return -1;
 }
 
+// How a value changes when one parameter grows.
+enum class Trend { none, rising, falling, unknown };
+
+Trend reversed(Trend trend) {
+  return trend == Trend::rising ? Trend::falling : trend == Trend::falling ? Trend::rising : trend;
+}
+
+// Returns the trend of a value that rises with both of two values.
+Trend both(Trend a, Trend b) {
+  return a == b || b == Trend::none ? a : a == Trend::none ? b : Trend::unknown;
+}
+
+struct Trended {
+  Range range;
+  Trend trend = Trend::none;
+};
+
+Trend trend_of(Op op, const Trended& x) {
+  switch (op) {
+    case Op::negate:
+      return reversed(x.trend);
+    case Op::sqrt:
+    case Op::exp:
+      return x.trend;
+    default:
+      return x.trend == Trend::none ? Trend::none : Trend::unknown;
+  }
+}
+
+Trend trend_of(Op op, const Trended& x, const Trended& y) {
+  if (x.trend == Trend::none && y.trend == Trend::none) {
+    return Trend::none;
+  }
+  const bool are_positive = x.range.lowest >= 0.0 && y.range.lowest >= 0.0;
+  switch (op) {
+    case Op::add:
+    case Op::minimum:
+    case Op::maximum:
+      return both(x.trend, y.trend);
+    case Op::subtract:
+      return both(x.trend, reversed(y.trend));
+    case Op::multiply:
+      return are_positive ? both(x.trend, y.trend) : Trend::unknown;
+    case Op::divide:
+      return are_positive && y.range.lowest > 0.0 ? both(x.trend, reversed(y.trend))
+                                                  : Trend::unknown;
+    case Op::power:
+      return are_positive && y.trend == Trend::none ? x.trend : Trend::unknown;
+    default:
+      return Trend::unknown;
+  }
+}
+
+// Returns whether the formula only rises or only falls with the parameter, anywhere in the box.
+bool is_monotone(std::span<const Step> formula, const ParameterBox& box, std::uint32_t parameter) {
+  const Trend trend =
+      run<Trended>(
+          formula,
+          [](double value) {
+            return Trended{{value, value}, Trend::none};
+          },
+          [&](std::uint32_t index) {
+            return Trended{{box.lowest[index], box.highest[index]},
+                           index == parameter ? Trend::rising : Trend::none};
+          },
+          [](Op op, const Trended& x) {
+            return Trended{apply(op, x.range), trend_of(op, x)};
+          },
+          [](Op op, const Trended& x, const Trended& y) {
+            return Trended{apply(op, x.range, y.range), trend_of(op, x, y)};
+          })
+          .trend;
+  return trend != Trend::unknown;
+}
+
+Range joined(Range a, Range b) {
+  return {std::min(a.lowest, b.lowest), std::max(a.highest, b.highest)};
+}
+
 }  // namespace
 
+// If the formula is monotone in a parameter that occurs more than once, its values at both ends of
+// the range bound all others. Otherwise the range is divided into pieces.
 Range formula_range(std::span<const Step> formula, const ParameterBox& box) {
   const int cut = repeated(formula, box);
   if (cut < 0) {
     return range_of(formula, box.lowest, box.highest);
   }
   const auto at = static_cast<std::size_t>(cut);
+  if (is_monotone(formula, box, static_cast<std::uint32_t>(cut))) {
+    ParameterBox low = box;
+    ParameterBox high = box;
+    low.highest[at] = box.lowest[at];
+    high.lowest[at] = box.highest[at];
+    return joined(formula_range(formula, low), formula_range(formula, high));
+  }
   std::vector<double> low = box.lowest;
   std::vector<double> high = box.highest;
   const double width = (box.highest[at] - box.lowest[at]) / pieces;
@@ -177,8 +265,7 @@ Range formula_range(std::span<const Step> formula, const ParameterBox& box) {
   for (int i = 0; i < pieces; ++i) {
     low[at] = box.lowest[at] + i * width;
     high[at] = i + 1 == pieces ? box.highest[at] : box.lowest[at] + (i + 1) * width;
-    const Range piece = range_of(formula, low, high);
-    whole = {std::min(whole.lowest, piece.lowest), std::max(whole.highest, piece.highest)};
+    whole = joined(whole, range_of(formula, low, high));
   }
   return whole;
 }

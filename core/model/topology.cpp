@@ -213,18 +213,15 @@ class StringModes {
     }
   }
 
-  // Returns n HZ sqrt((1 + B n^2) / (1 + B)), detuned for one of several strings.
+  // Returns n HZ sqrt((1 + B n^2) / (1 + B)), detuned for one of several strings. The quotient is
+  // written as n^2 - (n^2 - 1) / (1 + B), where B occurs once, for the bounds of its range.
   Formula hz_of(std::uint32_t n, std::uint32_t string) const {
-    const Formula& b = network_.arguments[string_.inharmonicity];
-    Formula stretch = b;
-    append(stretch, {{Op::number, 0, static_cast<double>(n) * n},
-                     {Op::multiply},
-                     {Op::number, 0, 1.0},
-                     {Op::add},
-                     {Op::number, 0, 1.0}});
-    append(stretch, b);
+    const double square = static_cast<double>(n) * n;
+    Formula stretch = {{Op::number, 0, square}, {Op::number, 0, square - 1.0}, {Op::number, 0, 1.0}};
+    append(stretch, network_.arguments[string_.inharmonicity]);
     append(stretch, {{Op::add},
                      {Op::divide},
+                     {Op::subtract},
                      {Op::sqrt},
                      {Op::number, 0, static_cast<double>(n)},
                      {Op::multiply}});

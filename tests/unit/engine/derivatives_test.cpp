@@ -64,15 +64,4 @@ TEST_CASE("an output of velocity is the difference of the positions", "[derivati
   CHECK(peak_of(x) > 1e-3);
 }
 
-TEST_CASE("a falling mass has the acceleration of gravity", "[derivatives]") {
-  // A free fall: the acceleration in every sample is G.
-  Player player("@m mass 1. 0.001 0. 0.\n@f ground 0.\n@s spring @m @f 0. 0.\n"
-                "@out1 accOutput @m\n",
-                Preset{});
-  player.run(100);
-  for (std::size_t n = 2; n < 100; ++n) {
-    REQUIRE(std::fabs(player.out[0][n]) == Approx(0.001).epsilon(1e-6));
-  }
-}
-
 }  // namespace ressort::derivatives_test

@@ -91,7 +91,7 @@ const std::vector<Event> one_note = {note_on(0, 69)};
 
 }  // namespace
 
-TEST_CASE("a vibrato has its rate and depth, after its delay and fade", "[gesture]") {
+TEST_CASE("a vibrato has its rate and depth, after its delay and fade", "[lfo]") {
   for (const LfoShape shape : {LfoShape::sine, LfoShape::triangle}) {
     const LfoSetting vibrato{
         .name = "v", .lfo = {.rate_hz = 5.0, .delay_s = 0.5, .fade_s = 1.0, .shape = shape}};
@@ -103,7 +103,7 @@ TEST_CASE("a vibrato has its rate and depth, after its delay and fade", "[gestur
   }
 }
 
-TEST_CASE("a tremolo changes the level by its range in dB", "[gesture]") {
+TEST_CASE("a tremolo changes the level by its range in dB", "[lfo]") {
   const LfoSetting tremolo{.name = "t", .lfo = {.rate_hz = 4.0, .delay_s = 0.5}};
   const auto there = levels_of(heard(moved(tremolo, "level", -12.0, 0.0), one_note));
   const auto plain = levels_of(heard(struck(4), one_note));
@@ -124,7 +124,7 @@ TEST_CASE("a tremolo changes the level by its range in dB", "[gesture]") {
 }
 
 TEST_CASE("the wheel scales the depth of a vibrato, and each note has a vibrato of its own",
-          "[gesture]") {
+          "[lfo]") {
   LfoSetting vibrato{.name = "v", .lfo = {.rate_hz = 5.0}};
   vibrato.by = ControlSource::controller;
   vibrato.number = 1;
@@ -146,7 +146,7 @@ TEST_CASE("the wheel scales the depth of a vibrato, and each note has a vibrato 
   CHECK(most < 1e-9 * peak(low));
 }
 
-TEST_CASE("the rate differs from note to note by its deviation, and repeats", "[gesture]") {
+TEST_CASE("the rate differs from note to note by its deviation, and repeats", "[lfo]") {
   const LfoSetting vibrato{.name = "v", .lfo = {.rate_hz = 5.0, .deviation = 0.2}};
   const Preset preset = moved(vibrato, "pitch", -50.0, 50.0);
   const double first = rate_of(cents_of(heard(preset, one_note)), 0.1);
@@ -160,7 +160,7 @@ TEST_CASE("the rate differs from note to note by its deviation, and repeats", "[
 }
 
 TEST_CASE("variation changes strength and time within its bounds, and keeps releases",
-          "[gesture]") {
+          "[lfo]") {
   constexpr std::uint32_t period = 22050;
   std::vector<Event> events;
   for (std::uint32_t i = 0; i < 20; ++i) {

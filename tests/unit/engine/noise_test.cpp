@@ -86,7 +86,7 @@ double power_at(std::span<const double> y, std::size_t size, double hz, double r
 
 }  // namespace
 
-TEST_CASE("a burst of noise has its level and its band at any sample rate", "[gesture]") {
+TEST_CASE("a burst of noise has its level and its band at any sample rate", "[noise]") {
   constexpr double low_hz = 500.0;
   constexpr double high_hz = 5000.0;
   constexpr double level = 0.25;
@@ -113,7 +113,7 @@ TEST_CASE("a burst of noise has its level and its band at any sample rate", "[ge
   }
 }
 
-TEST_CASE("a force has the level of its noise, whatever the sample rate", "[gesture]") {
+TEST_CASE("a force has the level of its noise, whatever the sample rate", "[noise]") {
   // Far below its resonance of 3.5 kHz, the mass moves by F/K.
   const std::string stiff =
       "@g ground 0.\n@m mass 1. 0. 0.\n@k springDamper @g @m 0.25 0.5\n@in1 frcInput @m\n"
@@ -128,7 +128,7 @@ TEST_CASE("a force has the level of its noise, whatever the sample rate", "[gest
 }
 
 TEST_CASE("a burst decays by its T60 and ends, and the key's pitch does not change it",
-          "[gesture]") {
+          "[noise]") {
   for (const int key : {36, 96}) {
     CAPTURE(key);
     Preset preset = played(noise_of(1.0, 200.0, 500.0, 8000.0));
@@ -145,7 +145,7 @@ TEST_CASE("a burst decays by its T60 and ends, and the key's pitch does not chan
   }
 }
 
-TEST_CASE("bursts repeat from render to render and differ from note to note", "[gesture]") {
+TEST_CASE("bursts repeat from render to render and differ from note to note", "[noise]") {
   const Preset preset = played(noise_of(1.0, 10'000.0, 20.0, 20'000.0));
   const std::vector<Event> events = {note_on(0, 60), note_on(20'000, 60)};
   Player first(bare_input, preset);
@@ -163,7 +163,7 @@ TEST_CASE("bursts repeat from render to render and differ from note to note", "[
   CHECK(rms(y.first(20'000)) > 0.5);
 }
 
-TEST_CASE("a bow's speed fluctuates by its noise, and not at all without it", "[gesture]") {
+TEST_CASE("a bow's speed fluctuates by its noise, and not at all without it", "[noise]") {
   constexpr double speed = 1e-4;
   const auto velocities = [&](double noise) {
     Player player(bare_input, played({.target = "in1",
@@ -188,7 +188,7 @@ TEST_CASE("a bow's speed fluctuates by its noise, and not at all without it", "[
         Approx(0.61).epsilon(0.2));  // 0.494 by 0.808, by both filters
 }
 
-TEST_CASE("a control of releases plays when the key is released, or the pedal", "[gesture]") {
+TEST_CASE("a control of releases plays when the key is released, or the pedal", "[noise]") {
   const ControlSetting strike{.source = ControlSource::release,
                               .target = "in1",
                               .gesture = Gesture::impulse,
@@ -219,7 +219,7 @@ TEST_CASE("a control of releases plays when the key is released, or the pedal", 
   CHECK(peak(heard(higher, {note_on(0, 60), note_off(4000, 60)})) == 0.0);
 }
 
-TEST_CASE("a release plays the released voice, not the latest one", "[gesture]") {
+TEST_CASE("a release plays the released voice, not the latest one", "[noise]") {
   Preset preset = played({.source = ControlSource::release,
                           .target = "in1",
                           .gesture = Gesture::impulse,
