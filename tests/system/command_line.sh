@@ -102,7 +102,7 @@ expect 2 "is not a readable sound file" "$program" describe text.wav
 expect 2 "must be one of hann, hamming, blackman, none" "$program" describe blow.flac --window flat
 expect 2 "must be a whole number, 4 to 65536" "$program" describe blow.flac --frame 2048.5
 expect 2 "at 999999 is not within the sound" "$program" describe blow.flac --at 999999
-expect 2 "is silent at key 127" "$program" describe Celesta --note 127 -s 0.1
+expect 2 "is silent at key 127" "$program" describe PolyTriangle --note 127 -s 0.1
 expect 0 '"window":"blackman","spectrum":"power","closed_form":false,"at":512' \
   "$program" describe blow.flac --json --at 512 --window blackman --spectrum power
 expect 2 "is not linear" "$program" describe "$source/models/BowedString.mdl"

@@ -106,7 +106,8 @@ TEST_CASE(
     CHECK(levels_db[2] > -22.0);
     CHECK(levels_db[2] < -1.0);
     CHECK(levels_db[3] < 0.0);
-    CHECK(levels_db[3] - levels_db[0] > 14.0);
+    // The quill of a harpsichord plucks with almost the same force, however hard its key is struck.
+    CHECK(levels_db[3] - levels_db[0] > (name == "Harpsichord" ? 2.0 : 14.0));
     CHECK(levels_db[3] - levels_db[0] < 34.0);
   }
 }
