@@ -6,24 +6,16 @@
 #include <cstdint>
 #include <numbers>
 
+#include "core/random.h"
+
 namespace ressort {
 
-// Uniform numbers in -1..1 by xorshift64 (Marsaglia 2003). Any seed is valid: it is mixed by
-// splitmix64 (Steele, Lea and Flood 2014). [audio] wait-free
+// Uniform numbers in -1..1. Any seed is valid. [audio] wait-free
 class RandomNumbers {
  public:
-  explicit RandomNumbers(std::uint64_t seed = 0) {
-    seed += 0x9e3779b97f4a7c15u;
-    seed = (seed ^ (seed >> 30)) * 0xbf58476d1ce4e5b9u;
-    seed = (seed ^ (seed >> 27)) * 0x94d049bb133111ebu;
-    state_ = std::max<std::uint64_t>(1, seed ^ (seed >> 31));
-  }
-  double next() {
-    state_ ^= state_ << 13;
-    state_ ^= state_ >> 7;
-    state_ ^= state_ << 17;
-    return static_cast<double>(static_cast<std::int64_t>(state_)) * 0x1p-63;
-  }
+  explicit RandomNumbers(std::uint64_t seed = 0)
+      : state_(std::max<std::uint64_t>(1, splitmix64(seed))) {}
+  double next() { return white_sample(state_); }
 
  private:
   std::uint64_t state_;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/random.h"
+
 namespace ressort::engine {
 
 Mixing::Mixing(const Playing& playing)
@@ -146,14 +148,11 @@ void Mixing::add_frozen(const Program& program, const VoiceGroup& group, const S
   }
 }
 
-// Uniform noise in -1..1 by xorshift64 (Marsaglia 2003). The seed is fixed, so renders repeat.
+// The seed is fixed, so renders repeat.
 void Mixing::make_noise(const Segment& segment) {
   for (std::size_t n = segment.at; n < segment.end(); ++n) {
     for (double* const output : segment.outputs) {
-      noise_ ^= noise_ << 13;
-      noise_ ^= noise_ >> 7;
-      noise_ ^= noise_ << 17;
-      output[n] *= static_cast<double>(static_cast<std::int64_t>(noise_)) * 0x1p-63;
+      output[n] *= white_sample(noise_);
     }
   }
 }

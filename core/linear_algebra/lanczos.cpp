@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <utility>
 
+#include "core/random.h"
+
 namespace ressort::linear_algebra {
 namespace {
 
@@ -36,16 +38,12 @@ Symmetric pairs_of(const Dense& matrix) {
           Eigen::Map<const Dense>(std::begin(pairs.vectors.values), matrix.rows(), matrix.cols())};
 }
 
-// Returns a matrix of pseudo-random numbers between -1 and 1, the same on every machine
-// (splitmix64).
+// Returns a matrix of pseudo-random numbers between -1 and 1, the same on every machine.
 Dense scattered(Index rows, Index columns) {
   Dense x(rows, columns);
   std::uint64_t state = 0;
   for (Index i = 0; i < x.size(); ++i) {
-    std::uint64_t z = (state += 0x9e3779b97f4a7c15U);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9U;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebU;
-    x.data()[i] = static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-52 - 1.0;
+    x.data()[i] = static_cast<double>(splitmix64(state) >> 11) * 0x1p-52 - 1.0;
   }
   return x;
 }

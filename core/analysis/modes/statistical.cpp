@@ -5,20 +5,18 @@
 #include <cstdlib>
 #include <numbers>
 
+#include "core/random.h"
+
 namespace ressort::analysis {
 namespace {
 
-// splitmix64 with the Box-Muller transform: the same numbers with every standard library.
+// Distributions by the inverse of their function and by the Box-Muller transform, because those of
+// the standard libraries differ.
 class Random {
  public:
   explicit Random(std::uint64_t seed) : state_(seed) {}
   // Above 0, at most 1.
-  double share() {
-    std::uint64_t z = (state_ += 0x9e3779b97f4a7c15U);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9U;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebU;
-    return static_cast<double>(((z ^ (z >> 31)) >> 11) + 1) * 0x1p-53;
-  }
+  double share() { return static_cast<double>((splitmix64(state_) >> 11) + 1) * 0x1p-53; }
   double gaussian() {
     const double radius = std::sqrt(-2.0 * std::log(share()));
     return radius * std::cos(2.0 * std::numbers::pi * share());
