@@ -96,7 +96,8 @@ std::span<const std::uint16_t> Parameters::take_changes() {
 void Parameters::update_voice_values(const Voices& voices) {
   for (std::size_t lane = 0; !voice_values_.empty() && lane < voices.size(); ++lane) {
     const Voice& voice = voices[lane];
-    for (std::size_t i = 0; voice.awake && i < values_.size(); ++i) {
+    const bool may_differ = has_changed() || voice.is_new || voice.is_retuned;
+    for (std::size_t i = 0; voice.awake && may_differ && i < values_.size(); ++i) {
       voice_values_[lane * values_.size() + i] = value_in_voice(playing_, i, values_[i], voice);
     }
   }
