@@ -162,7 +162,7 @@ int repeated(std::span<const Step> formula, const ParameterBox& box) {
   return -1;
 }
 
-// How a value changes when one parameter grows.
+// Direction in which a value moves when one parameter grows.
 enum class Trend { none, rising, falling, unknown };
 
 Trend reversed(Trend trend) {

@@ -22,7 +22,8 @@ struct ParameterBox {
 };
 
 // Returns a range that contains every value of the formula in the box. It is exact if each
-// parameter occurs once or the box is a point, and slightly too wide otherwise. A formula that may
+// parameter occurs once, if the formula is monotone in all others, or if the box is a point, and
+// slightly too wide otherwise. A formula that may
 // be undefined gives the whole line. O(steps). [any thread but audio]
 Range formula_range(std::span<const Step> formula, const ParameterBox& box);
 
