@@ -88,7 +88,7 @@ TEST_CASE("a modal string sounds its partials with their decay at every rate", "
 
 TEST_CASE("a steady force at x presses on the bridge with the share x", "[modal_string]") {
   // The mode of partial n yields by F sin(n pi x) / (n^2 K) without stiffness, K that of partial 1.
-  // So the bridge's place reads F/K times the sum of (-1)^(n+1) sin(n pi x) / n, which is pi x / 2.
+  // The bridge's place therefore reads F/K times the sum of (-1)^(n+1) sin(n pi x) / n, which is pi x / 2.
   constexpr double omega = 2.0 * pi * 100.0 / 44100.0;
   constexpr double sigma = 60.0 / 44100.0;
   for (const double x : {0.1, 0.35, 0.6}) {
