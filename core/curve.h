@@ -41,8 +41,8 @@ struct VoiceCurve {
   double lowest = 0.0;               // range of the knob and of all values
   double highest = 0.0;
 
-  // In a range above 0 the knob and the velocity are factors, and the logarithm of the values is
-  // interpolated. In any other range the knob and the velocity are offsets.
+  // The knob and the velocity are factors if the range is above 0, and the logarithm of the values
+  // is interpolated. They are offsets in any other range.
   bool is_by_ratios() const { return lowest > 0.0; }
 
   double on_key(double key, double knob) const { return limited(unlimited(key, knob)); }

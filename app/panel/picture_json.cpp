@@ -212,11 +212,11 @@ class NetworkJsonWriter {
       count(link.name.text(), link.arguments);
     }
     for (const Macro& macro : network.macros) {
-      count(macro.name,
-            std::array{macro.mass, macro.stiffness, macro.second_stiffness, macro.damping,
-                       macro.air_damping, macro.impedance, macro.frequency_hz, macro.t60_s,
-                       macro.inharmonicity, macro.losses[0], macro.losses[1], macro.losses[2],
-                       macro.spread_cents, macro.bridge_loss});
+      std::vector<ArgumentId> arguments;
+      for (const ArgumentId* const argument : arguments_of(macro)) {
+        arguments.push_back(*argument);
+      }
+      count(macro.name, arguments);
     }
     json out = json::object();
     for (std::size_t i = 0; i < users.size(); ++i) {

@@ -60,7 +60,7 @@ std::string misfit(const Network& network, const Preset& preset,
   for (const BodyModel& body : preset.bodies) {
     if (find_parameter(body.network, setting.name) >= 0) {
       return quoted(setting.name) + " is a parameter of " +
-             quoted(body.file.substr(body.file.rfind('/') + 1)) +
+             quoted(body.name()) +
              " in 'through', which all voices share, so it has no curve; rename one of them";
     }
   }
@@ -92,7 +92,7 @@ std::string misfit_of_bodies(const Network& network, const Preset& preset) {
   const Network* from = &network;
   std::string name = "the model";
   for (const BodyModel& body : preset.bodies) {
-    const std::string file = quoted(body.file.substr(body.file.rfind('/') + 1));
+    const std::string file = quoted(body.name());
     for (const Output& output : from->outputs) {
       if (!hears_channel(body.network, output.number)) {
         const std::string number = std::to_string(output.number);

@@ -103,6 +103,7 @@ struct MorphSetting {
 struct BodyModel {
   std::string file;  // path, for messages
   Network network;
+  std::string name() const { return file.substr(file.rfind('/') + 1); }
   bool operator==(const BodyModel&) const = default;
 };
 
