@@ -6,7 +6,7 @@ set(ressort_fuzzers model preset score midi smf scala console osc osc_packet fli
 list(TRANSFORM ressort_fuzzers PREPEND fuzz_ OUTPUT_VARIABLE ressort_deep_tests)
 list(APPEND ressort_deep_tests arm everything_sanitized everything_more forms_everywhere
   accuracy_everywhere silence_everywhere modes_everywhere calculix_everywhere bodies_everywhere
-  bells_everywhere heard_pitch_everywhere thorough bench lint scenes_more abuse_long callback_minute bows settings_more edits_more
+  bells_everywhere heard_pitch_everywhere tuner_48000 tuner_96000 thorough bench lint scenes_more abuse_long callback_minute bows settings_more edits_more
   flights_everywhere server_killed installed soak races)
 list(LENGTH ressort_deep_tests ressort_deep_count)
 
@@ -41,6 +41,12 @@ add_deep_test(scenes_more 200 ${CMAKE_COMMAND} -E env RESSORT_SCENES=1001,2000,1
 
 # The pitch of every tuned preset, measured on the sound over the keyboard at three rates.
 add_deep_test(heard_pitch_everywhere 120 $<TARGET_FILE:ressort_tests> "[heard_pitch_everywhere]")
+
+# Every semitone of presets whose partials are clear enough for YIN, at two rates.
+foreach(rate IN ITEMS 48000 96000)
+  add_deep_test(tuner_${rate} 60 $<TARGET_FILE:ressort_voicing> --tuner ${rate} CoupledStrings Guitar
+    HandBell Marimba MarimbaTube PluckedHarmonics Resonator SlidingFret SteelDrum Vibraphone)
+endforeach()
 
 # Masses and bodies one per cent below and above the stability limit.
 add_deep_test(bodies_everywhere 60 $<TARGET_FILE:ressort_tests> "[bodies_everywhere]")
