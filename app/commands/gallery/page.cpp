@@ -57,10 +57,13 @@ plot::Panel spectrogram_panel(const ShownPreset& preset, const Spectrogram& show
   rim.data = dots.data;
   plot::Panel panel{.x = {.from = shown.from_s, .to = shown.to_s},
                     .y = {.from = octave_of(shown.lowest_hz), .to = octave_of(shown.highest_hz)},
-                    .series = {cells, rim, dots},
+                    .series = {cells},
                     .colours = plot::ColourMap::grey,
                     .lightest = lightest_dbfs,
                     .darkest = darkest_dbfs};
+  if (!dots.data.empty()) {
+    panel.series.insert(panel.series.end(), {rim, dots});
+  }
   for (const double hz : ticks_hz) {
     panel.y.ticks.push_back(
         {octave_of(hz), hz < 1000.0 ? fixed(hz, 0) : fixed(hz / 1000.0, 0) + "k"});
