@@ -87,7 +87,7 @@ TEST_CASE("The program survives the end of its server, or reports it by the exit
     server->kill();
     REQUIRE(play.says("is lost"));
     server.reset();
-    server = std::make_unique<Server>(512);
+    server = std::make_unique<Server>(512, 48000, false);
     REQUIRE(play.says("playing again"));
     Listener listener(48000 * 20);
     listener.plan({{9600, {0x90, 60, 110}}});
@@ -150,7 +150,7 @@ TEST_CASE("The program survives the end of its server, or reports it by the exit
       CHECK(play.said().find("cpu     no audio is running") != std::string::npos);
       neighbour.reset();
       server.reset();
-      server = std::make_unique<Server>(next.period_frames, next.rate_hz);
+      server = std::make_unique<Server>(next.period_frames, next.rate_hz, false);
       REQUIRE(play.says("playing again"));
       std::this_thread::sleep_for(300ms);  // the neighbour comes later than the program
       neighbour = std::make_unique<Neighbour>();
@@ -202,7 +202,7 @@ TEST_CASE("An overloaded program survives every end of its server", "[server_los
     i % 2 == 0 ? server->end() : server->kill();
     CHECK(play.says("is lost"));
     server.reset();
-    server = std::make_unique<Server>(128);
+    server = std::make_unique<Server>(128, 48000, false);
     CHECK(play.says("playing again"));
   }
   player.request_stop();
