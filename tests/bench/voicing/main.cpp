@@ -344,7 +344,7 @@ int run(int argc, char** argv) {
         Player player(name, 44100.0);
         failures += check_restrikes(player, name, restrikes);
       } else if (tuner_hz > 0.0) {
-        Player player(name, tuner_hz);
+        Player player(name, tuner_hz, false);
         failures += check_semitones(player, name);
       } else {
         Player player(name, 48000.0);

@@ -13,10 +13,13 @@ namespace {
 
 constexpr std::size_t block_frames = 256;
 
-Scene scene_of(const std::string& name) {
+Scene scene_of(const std::string& name, bool with_lfos) {
   auto scene = load_scene(name, {});
   if (!scene) {
     throw std::runtime_error(scene.error().message);
+  }
+  for (LfoSetting& setting : scene->preset.lfos) {
+    setting.lfo.depth = with_lfos ? setting.lfo.depth : 0.0;
   }
   return *std::move(scene);
 }
@@ -51,8 +54,8 @@ Event press(double amount) {
   return {.kind = EventKind::pressure, .value = amount};
 }
 
-Player::Player(const std::string& name, double rate_hz)
-    : scene_(scene_of(name)),
+Player::Player(const std::string& name, double rate_hz, bool with_lfos)
+    : scene_(scene_of(name, with_lfos)),
       compiled_(compiled_of(scene_, rate_hz)),
       rate_hz_(rate_hz),
       blocker_(rate_hz) {}

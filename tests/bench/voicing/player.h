@@ -25,8 +25,8 @@ Event press(double amount);  // the whole channel
 
 class Player {
  public:
-  // Throws std::runtime_error with all errors.
-  Player(const std::string& name, double rate_hz);
+  // Throws std::runtime_error with all errors. Without LFOs, a bow plays without vibrato.
+  Player(const std::string& name, double rate_hz, bool with_lfos = true);
 
   // Plays from silence, with the parameters of the preset and without input signals. The events are
   // sorted by time.

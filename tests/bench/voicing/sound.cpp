@@ -113,6 +113,69 @@ double power_at(std::span<const double> seen, double step) {
   return std::norm(sum);
 }
 
+// The mean pitch of partials, and how far they scatter around it.
+struct Fit {
+  double cents = 0.0;
+  double scatter = 0.0;
+};
+
+struct Partial {
+  int n = 0;
+  double cents = 0.0;  // above n times the wanted frequency
+  double power = 0.0;
+};
+
+Fit fit_partials(std::span<const Partial> partials, double stiffness) {
+  Fit fit;
+  double weight = 0.0;
+  double moment = 0.0;
+  const auto of_string = [&](const Partial& partial) {
+    return partial.cents - stretch_cents(partial.n, stiffness);
+  };
+  for (const Partial& partial : partials) {
+    weight += partial.power;
+    moment += partial.power * of_string(partial);
+  }
+  fit.cents = weight > 0.0 ? moment / weight : 0.0;
+  for (const Partial& partial : partials) {
+    const double off = of_string(partial) - fit.cents;
+    fit.scatter += partial.power * off * off;
+  }
+  return fit;
+}
+
+std::vector<Partial> find_partials(const Stereo& sound, double wanted_hz) {
+  const Spectrum spectrum = spectrum_of(sound, 4);
+  const std::vector<double>& magnitude = spectrum.magnitude;
+  constexpr double half_semitone = 0.029;
+  std::vector<Partial> partials;
+  for (int n = 1; n <= 8; ++n) {
+    const double hz = wanted_hz * n;
+    const auto first = static_cast<std::size_t>(hz * (1.0 - half_semitone) / spectrum.bin_hz);
+    const auto last = static_cast<std::size_t>(hz * (1.0 + half_semitone) / spectrum.bin_hz) + 1;
+    if (last + 1 >= magnitude.size()) {
+      break;
+    }
+    const auto peak = static_cast<std::size_t>(
+        std::max_element(magnitude.begin() + static_cast<std::ptrdiff_t>(first),
+                         magnitude.begin() + static_cast<std::ptrdiff_t>(last) + 1) -
+        magnitude.begin());
+    if (peak == first || peak == last) {
+      continue;  // the slope of another peak
+    }
+    // A parabola through the logarithms of three bins.
+    const double a = std::log(magnitude[peak - 1] + 1e-30);
+    const double b = std::log(magnitude[peak] + 1e-30);
+    const double c = std::log(magnitude[peak + 1] + 1e-30);
+    const double curve = a - 2.0 * b + c;
+    const double at = static_cast<double>(peak) + (curve < 0.0 ? 0.5 * (a - c) / curve : 0.0);
+    partials.push_back({.n = n,
+                        .cents = cents(at * spectrum.bin_hz, hz),
+                        .power = magnitude[peak] * magnitude[peak]});
+  }
+  return partials;
+}
+
 }  // namespace
 
 std::vector<double> Stereo::sum() const {
@@ -307,6 +370,36 @@ Pitch pitch_of(const Stereo& sound, double wanted_hz) {
   return pitch;
 }
 
+Stereo band_around(const Stereo& sound, double hz, double width) {
+  std::size_t length = 1;
+  // The padding keeps the end from ringing into the start.
+  while (length < sound.size() + static_cast<std::size_t>(2.0 * sound.rate_hz / (width * hz))) {
+    length *= 2;
+  }
+  // The channels are the real and the imaginary part of one signal.
+  std::vector<std::complex<double>> x(length);
+  for (std::size_t n = 0; n < sound.size(); ++n) {
+    x[n] = {sound.channels[0][n], sound.channels[1][n]};
+  }
+  transform(x);
+  for (std::size_t k = 0; k < length; ++k) {
+    const double bin = static_cast<double>(std::min(k, length - k));
+    const double off = (bin * sound.rate_hz / static_cast<double>(length) / hz - 1.0) / width;
+    x[k] *= std::exp(-0.5 * off * off) / static_cast<double>(length);
+  }
+  // The inverse transform is the conjugate of the transform of the conjugate.
+  for (std::complex<double>& value : x) {
+    value = std::conj(value);
+  }
+  transform(x);
+  Stereo band{.channels = {}, .rate_hz = sound.rate_hz};
+  for (std::size_t n = 0; n < sound.size(); ++n) {
+    band.channels[0].push_back(x[n].real());
+    band.channels[1].push_back(-x[n].imag());
+  }
+  return band;
+}
+
 double yin_hz(const Stereo& sound, double lowest_hz, double highest_hz) {
   constexpr double deep = 0.1;
   const std::size_t louder = energy_of(sound.channels[0]) < energy_of(sound.channels[1]) ? 1 : 0;
@@ -360,37 +453,31 @@ double yin_hz(const Stereo& sound, double lowest_hz, double highest_hz) {
   return sound.rate_hz / period;
 }
 
-double partials_cents(const Stereo& sound, double wanted_hz) {
-  const Spectrum spectrum = spectrum_of(sound, 4);
-  const std::vector<double>& magnitude = spectrum.magnitude;
-  constexpr double half_semitone = 0.029;
-  double weight = 0.0;
-  double moment = 0.0;
-  for (int n = 1; n <= 8; ++n) {
-    const double hz = wanted_hz * n;
-    const auto first = static_cast<std::size_t>(hz * (1.0 - half_semitone) / spectrum.bin_hz);
-    const auto last = static_cast<std::size_t>(hz * (1.0 + half_semitone) / spectrum.bin_hz) + 1;
-    if (last + 1 >= magnitude.size()) {
-      break;
+double stretch_cents(int n, double stiffness) {
+  return 600.0 * std::log2((1.0 + stiffness * n * n) / (1.0 + stiffness));
+}
+
+PartialsPitch partials_pitch(const Stereo& sound, double wanted_hz) {
+  const std::vector<Partial> partials = find_partials(sound, wanted_hz);
+  // Ternary search of the stiffness whose series scatters least, to 1e-3 of itself.
+  constexpr double stiffest = 0.05;
+  double low = 0.0;
+  double high = stiffest;
+  while (high - low > 1e-3 * high && high > 1e-7) {
+    const double a = low + (high - low) / 3.0;
+    const double b = high - (high - low) / 3.0;
+    if (fit_partials(partials, a).scatter <= fit_partials(partials, b).scatter) {
+      high = b;
+    } else {
+      low = a;
     }
-    const auto peak = static_cast<std::size_t>(
-        std::max_element(magnitude.begin() + static_cast<std::ptrdiff_t>(first),
-                         magnitude.begin() + static_cast<std::ptrdiff_t>(last) + 1) -
-        magnitude.begin());
-    if (peak == first || peak == last) {
-      continue;  // the slope of another peak
-    }
-    // A parabola through the logarithms of three bins.
-    const double a = std::log(magnitude[peak - 1] + 1e-30);
-    const double b = std::log(magnitude[peak] + 1e-30);
-    const double c = std::log(magnitude[peak + 1] + 1e-30);
-    const double curve = a - 2.0 * b + c;
-    const double at = static_cast<double>(peak) + (curve < 0.0 ? 0.5 * (a - c) / curve : 0.0);
-    const double power = magnitude[peak] * magnitude[peak];
-    weight += power;
-    moment += power * cents(at * spectrum.bin_hz, hz);
   }
-  return weight > 0.0 ? moment / weight : 0.0;
+  const auto strongest = std::max_element(
+      partials.begin(), partials.end(),
+      [](const Partial& a, const Partial& b) { return a.power < b.power; });
+  return {.cents = fit_partials(partials, high).cents,
+          .stiffness = high,
+          .strongest = strongest == partials.end() ? 1 : strongest->n};
 }
 
 double cents(double hz, double from_hz) {

@@ -55,14 +55,29 @@ struct Pitch {
 // rounding precision.
 Pitch pitch_of(const Stereo& sound, double wanted_hz);
 
+// Passes both channels through a band around a frequency: a Gaussian with a standard deviation of
+// `width` of it, without a phase shift.
+Stereo band_around(const Stereo& sound, double hz, double width);
+
 // Returns the pitch by YIN (de Cheveigne and Kawahara 2002) between two frequencies: the first dip
 // of the normalised difference function below 0.1, else its lowest point. Multiples of the period
 // sharpen the result.
 double yin_hz(const Stereo& sound, double lowest_hz, double highest_hz);
 
-// Returns the mean deviation in cents of the first eight partials from the harmonics of a
-// frequency, weighted by their powers. A partial lies within half a semitone of its harmonic.
-double partials_cents(const Stereo& sound, double wanted_hz);
+// Deviation of a sound's partials from a key, and the stiffness of the string that they fit.
+struct PartialsPitch {
+  double cents = 0.0;
+  double stiffness = 0.0;  // B: partial n is at n sqrt(1 + B n^2), of a harmonic sound 0
+  int strongest = 1;
+};
+
+// Returns how far partial n of a stiff string is above n times the first (Fletcher 1964).
+double stretch_cents(int n, double stiffness);
+
+// Measures the first eight partials, weighted by their powers. A partial lies within half a semitone
+// of its harmonic. Tuning devices for pianos do the same: they find B from the partials of the
+// string, and subtract its stretch from every partial.
+PartialsPitch partials_pitch(const Stereo& sound, double wanted_hz);
 
 double cents(double hz, double from_hz);
 

@@ -3,36 +3,61 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 #include <vector>
 
 namespace ressort::voicing {
 namespace {
 
-constexpr int lowest_key = 36;
-constexpr int highest_key = 96;
-constexpr double most_deviation_cents = 5.0;
-constexpr double start_s = 0.1;
+constexpr int lowest_key = 21;
+constexpr int highest_key = 108;
+// A bow's slip starts at a sample. From here on it locks on whole samples per period, which is up to
+// 20 cents off at 44.1 kHz.
+constexpr int highest_bowed_key = 95;
+constexpr double most_step_cents = 5.0;
+constexpr double most_partials_cents = 3.0;
+// A reading starts when a bow has caught the string and a curved bridge has let it go, or earlier
+// if the sound is too short.
+constexpr double late_s = 0.5;
+constexpr double early_s = 0.1;
+constexpr double short_db = -30.0;  // fall from the early to the late start
 constexpr double silence_db = -60.0;
 
 struct Reading {
   int key = 0;
-  bool is_heard = false;
   double yin_cents = 0.0;  // relative to the key
-  double partials_cents = 0.0;
+  PartialsPitch partials;
+  double step_cents = 0.0;  // deviation from a semitone above the last key
+  bool is_off() const {
+    return std::fabs(step_cents) > most_step_cents ||
+           std::fabs(partials.cents) > most_partials_cents;
+  }
 };
 
-Reading read(Player& player, int key) {
-  Reading reading{.key = key};
+// Empty if the key is silent.
+std::optional<Reading> read(Player& player, int key) {
   const double hz = 440.0 * std::exp2((key + player.instrument().transpose - 69) / 12.0);
-  const double seconds = std::max(0.4, 24.0 / hz);
-  const Stereo sound =
-      player.play({{0.0, note_on(key, 100)}}, start_s + seconds).part(start_s, 9.0);
-  reading.is_heard = decibels(peak_of(sound)) > silence_db;
-  if (reading.is_heard) {
-    reading.yin_cents = cents(yin_hz(sound, hz / 3.0, 3.0 * hz), hz);
-    reading.partials_cents = partials_cents(sound, hz);
+  const double seconds = std::max(1.5, 48.0 / hz);  // two strings may beat for so long
+  const Stereo all = player.play({{0.0, note_on(key, 100)}}, late_s + seconds + 4.0 / hz);
+  const auto level_at = [&](double from_s) {
+    return decibels(peak_of(all.part(from_s, from_s + 0.1)));
+  };
+  if (level_at(early_s) <= silence_db) {
+    return std::nullopt;
   }
-  return reading;
+  const bool is_short = level_at(late_s) < level_at(early_s) + short_db;
+  const double from_s = is_short ? early_s : late_s;
+  const double to_s = from_s + (is_short ? std::max(0.4, 24.0 / hz) : seconds);
+  const Stereo sound = all.part(from_s, to_s);
+  const PartialsPitch partials = partials_pitch(sound, hz);
+  // YIN weights partial n by n^2, so that a stiff string or a bar misleads it. It measures the
+  // strongest partial alone. The neighbours are 5 standard deviations away.
+  const int n = partials.strongest;
+  const Stereo band = band_around(all, n * hz, 0.2 / n).part(from_s, to_s);
+  return Reading{.key = key,
+                 .yin_cents = cents(yin_hz(band, n * hz / 1.5, n * hz * 1.5), n * hz) -
+                              stretch_cents(n, partials.stiffness),
+                 .partials = partials};
 }
 
 }  // namespace
@@ -41,31 +66,36 @@ int check_semitones(Player& player, const std::string& name) {
   if (!player.scene().preset.keyboard || !player.instrument().mode) {
     return 0;
   }
-  std::vector<Reading> readings;
-  for (int key = lowest_key; key <= highest_key; ++key) {
-    const Reading reading = read(player, key);
-    if (reading.is_heard) {
-      readings.push_back(reading);
-    }
-  }
-  const auto is_off = [&](std::size_t i) {
-    return i > 0 &&
-           std::fabs(readings[i].yin_cents - readings[i - 1].yin_cents) > most_deviation_cents;
-  };
+  int keys = 0;
   int off = 0;
-  double worst = 0.0;
-  for (std::size_t i = 0; i < readings.size(); ++i) {
-    off += is_off(i) ? 1 : 0;
-    worst = i > 0 ? std::max(worst, std::fabs(readings[i].yin_cents - readings[i - 1].yin_cents))
-                  : worst;
-    if (is_off(i)) {
-      std::printf("  %s key %d: YIN %+.1f cents, partials %+.1f cents%s\n", name.c_str(),
-                  readings[i].key, readings[i].yin_cents, readings[i].partials_cents,
-                  is_off(i) ? " !" : "");
+  double worst_step = 0.0;
+  double worst_partials = 0.0;
+  std::optional<Reading> last;
+  const std::vector<ControlSetting>& controls = player.scene().preset.controls;
+  const bool is_bowed = std::any_of(controls.begin(), controls.end(), [](const auto& control) {
+    return control.gesture == Gesture::bow;
+  });
+  for (int key = lowest_key; key <= (is_bowed ? highest_bowed_key : highest_key); ++key) {
+    std::optional<Reading> reading = read(player, key);
+    if (!reading) {
+      continue;
     }
+    if (last) {
+      reading->step_cents = reading->yin_cents - last->yin_cents;
+    }
+    ++keys;
+    worst_step = std::max(worst_step, std::fabs(reading->step_cents));
+    worst_partials = std::max(worst_partials, std::fabs(reading->partials.cents));
+    if (reading->is_off()) {
+      ++off;
+      std::printf("  %s key %d: YIN %+.1f cents, step %+.1f, partials %+.1f (B %.1e)\n",
+                  name.c_str(), key, reading->yin_cents, reading->step_cents,
+                  reading->partials.cents, reading->partials.stiffness);
+    }
+    last = reading;
   }
-  std::printf("%s: %d of %zu semitones off by more than %g cents, the worst by %.1f\n",
-              name.c_str(), off, readings.size(), most_deviation_cents, worst);
+  std::printf("%s: %d of %d keys off, the worst step by %.1f cents, the worst partials by %.1f\n",
+              name.c_str(), off, keys, worst_step, worst_partials);
   std::fflush(stdout);
   return off;
 }

@@ -7,9 +7,9 @@
 
 namespace ressort::voicing {
 
-// Measures every semitone of the presets' common range, and prints the preset's keys whose distance
-// to their lower neighbour is not 100 cents by YIN. Also prints the deviation of the partials
-// weighted by their power. Returns the number of such keys.
+// Measures keys 21 to 108 (of a bow, to 95) where they sound, and prints those that are not 100 cents above their
+// neighbour (within 5, by YIN of the strongest partial) or whose partials are off the key (by more
+// than 3, weighted by their power, less the stretch of a stiff string). Returns their number.
 int check_semitones(Player& player, const std::string& name);
 
 }  // namespace ressort::voicing
