@@ -145,7 +145,7 @@ Fit fit_partials(std::span<const Partial> partials, double stiffness) {
 }
 
 std::vector<Partial> find_partials(const Stereo& sound, double wanted_hz) {
-  const Spectrum spectrum = spectrum_of(sound, 4);
+  const Spectrum spectrum = spectrum_of(sound, 2);
   const std::vector<double>& magnitude = spectrum.magnitude;
   constexpr double half_semitone = 0.029;
   std::vector<Partial> partials;
