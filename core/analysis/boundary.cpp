@@ -131,8 +131,8 @@ BoundaryFinder::Margin BoundaryFinder::margin(const Weights& weights,
 double BoundaryFinder::crossing(const WeightLine& line, std::span<const double> shape, double safe,
                                 double bad) const {
   constexpr double rounding = 1e-14;
-  const double inside = margin(line(safe), shape).rest;
-  const double outside = margin(line(bad), shape).rest;
+  double inside = margin(line(safe), shape).rest;
+  double outside = margin(line(bad), shape).rest;
   if (!(inside > 0.0 && outside < 0.0 && std::isfinite(outside))) {
     return bad;
   }
@@ -141,9 +141,31 @@ double BoundaryFinder::crossing(const WeightLine& line, std::span<const double> 
   if (std::fabs(there.rest) < rounding * there.size) {
     return straight;
   }
-  for (int i = 0; i < 52; ++i) {
+  // The Illinois method: a secant through both ends, where an end that stays twice counts half
+  // (Dowell and Jarratt 1971). Both ends converge to the crossing.
+  int stayed = 0;  // 1: the bad end, -1: the safe end
+  for (int i = 0; i < 100; ++i) {
     const double middle = safe + 0.5 * (bad - safe);
-    (margin(line(middle), shape).rest > 0.0 ? safe : bad) = middle;
+    if (middle == safe || middle == bad) {
+      break;
+    }
+    double next = safe + (bad - safe) * inside / (inside - outside);
+    next = std::min(safe, bad) < next && next < std::max(safe, bad) ? next : middle;
+    const double here = margin(line(next), shape).rest;
+    if (std::fabs(here) < rounding * there.size) {
+      return next;
+    }
+    if (here > 0.0) {
+      safe = next;
+      inside = here;
+      outside *= stayed == 1 ? 0.5 : 1.0;
+      stayed = 1;
+    } else {
+      bad = next;
+      outside = here;
+      inside *= stayed == -1 ? 0.5 : 1.0;
+      stayed = -1;
+    }
   }
   return bad;
 }

@@ -41,14 +41,14 @@ std::string described(const Culprit& culprit) {
 
 // Finds a mass that is not above 0, or an argument that is not finite.
 std::optional<Proofs::Suspect> Proofs::find_invalid_number_in(
-    std::span<const Range> arguments) const {
+    std::span<const Range> arguments) {
   for (std::size_t row = 0; row < assembly_.masses.size(); ++row) {
     const Range mass = range_at(arguments, network_.masses[assembly_.masses[row]].mass);
     if (!(mass.lowest > 0.0 && std::isfinite(mass.highest))) {
       return Suspect{Quantity::mass, row};
     }
   }
-  const std::vector<Load> all = loads(arguments);
+  const std::span<const Load> all = loads(arguments);
   for (std::size_t t = 0; t < all.size(); ++t) {
     if (!std::isfinite(all[t].total())) {
       const bool is_stiff = !std::isfinite(all[t].stiff);
@@ -58,8 +58,8 @@ std::optional<Proofs::Suspect> Proofs::find_invalid_number_in(
   return std::nullopt;
 }
 
-Proofs::Suspect Proofs::feeder(std::span<const Range> arguments) const {
-  const std::vector<Load> all = lowest_loads(arguments);
+Proofs::Suspect Proofs::feeder(std::span<const Range> arguments) {
+  const std::span<const Load> all = lowest_loads(arguments);
   const auto least = std::min_element(all.begin(), all.end(), [](const Load& a, const Load& b) {
     return std::min(a.stiff, a.damped) < std::min(b.stiff, b.damped);
   });

@@ -13,6 +13,7 @@ namespace ressort::analysis {
 struct Range {
   double lowest = 0.0;
   double highest = 0.0;
+  bool operator==(const Range&) const = default;
 };
 
 // Lowest and highest values of the parameters: [parameter].

@@ -40,8 +40,23 @@ class Proofs {
   };
   enum class Course { flat, straight, bent };
 
-  std::vector<Load> loads(std::span<const Range> arguments) const;
-  std::vector<Load> lowest_loads(std::span<const Range> arguments) const;
+  // The last query. A query along one parameter changes few formulas and few terms, and only these
+  // are computed anew.
+  struct LastLoads {
+    std::vector<Range> arguments;  // [argument]
+    std::vector<Load> loads;       // [term]
+  };
+  using LoadOfTerm = Load (*)(const Network&, const Assembly::Term&, std::span<const Range>, double);
+
+  std::span<const Range> ranges(const ParameterBox& box);
+  std::span<const Load> loads(std::span<const Range> arguments) {
+    return update(highest_, arguments, highest_load);
+  }
+  std::span<const Load> lowest_loads(std::span<const Range> arguments) {
+    return update(lowest_, arguments, lowest_load);
+  }
+  std::span<const Load> update(LastLoads& last, std::span<const Range> arguments,
+                               LoadOfTerm load_of) const;
   Weights weights_for(std::span<const Range> arguments);
   Weights weights_for(std::span<const Range> arguments, const RangeOverride& instead);
   bool gains_energy(std::span<const Range> arguments);
@@ -50,8 +65,8 @@ class Proofs {
   SafeRange range_around(const WeightLine& line, double anchor);
 
   // Defined in culprit.cpp.
-  std::optional<Suspect> find_invalid_number_in(std::span<const Range> arguments) const;
-  Suspect feeder(std::span<const Range> arguments) const;
+  std::optional<Suspect> find_invalid_number_in(std::span<const Range> arguments);
+  Suspect feeder(std::span<const Range> arguments);
   Suspect find_worst_link(const Weights& weights, std::span<const Range> arguments,
                           std::span<const double> shape) const;
   std::optional<Suspect> find_lightest_mass(const Weights& weights,
@@ -69,6 +84,9 @@ class Proofs {
   Progress progress_;
   Assembly assembly_;
   BoundaryFinder boundary_;
+  ParameterBox box_;           // of the last query
+  std::vector<Range> ranges_;  // [argument] of the last query
+  LastLoads highest_, lowest_;
 };
 
 }  // namespace ressort::analysis

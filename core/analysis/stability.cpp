@@ -57,24 +57,53 @@ Proofs::Proofs(Network network, double rate_ratio, std::size_t most_exact, Progr
 
 // --- weights ------------------------------------------------------------------------------------
 
-std::vector<Load> Proofs::loads(std::span<const Range> arguments) const {
-  progress_.spend(assembly_.terms.size());
-  std::vector<Load> all;
-  all.reserve(assembly_.terms.size());
-  for (const Assembly::Term& term : assembly_.terms) {
-    all.push_back(highest_load(network_, term, arguments, rate_ratio_));
+std::span<const Range> Proofs::ranges(const ParameterBox& box) {
+  const std::size_t count = box.lowest.size();
+  std::vector<bool> has_moved(count, true);
+  for (std::size_t i = 0; i < std::min(count, box_.lowest.size()); ++i) {
+    has_moved[i] = box.lowest[i] != box_.lowest[i] || box.highest[i] != box_.highest[i];
   }
-  return all;
+  const bool is_first = ranges_.empty();
+  ranges_.resize(network_.arguments.size());
+  for (std::size_t i = 0; i < ranges_.size(); ++i) {
+    const Formula& formula = network_.arguments[i];
+    if (is_first || std::any_of(formula.begin(), formula.end(), [&](const Step& step) {
+          return step.op == Op::parameter && has_moved[step.index];
+        })) {
+      ranges_[i] = formula_range(formula, box);
+    }
+  }
+  box_ = box;
+  return ranges_;
 }
 
-std::vector<Load> Proofs::lowest_loads(std::span<const Range> arguments) const {
-  progress_.spend(assembly_.terms.size());
-  std::vector<Load> all;
-  all.reserve(assembly_.terms.size());
-  for (const Assembly::Term& term : assembly_.terms) {
-    all.push_back(lowest_load(network_, term, arguments, rate_ratio_));
+std::span<const Load> Proofs::update(LastLoads& last, std::span<const Range> arguments,
+                                     LoadOfTerm load_of) const {
+  const std::size_t count = assembly_.terms.size();
+  progress_.spend(count);
+  const bool is_first = last.arguments.empty();
+  std::vector<bool> has_moved(arguments.size(), true);
+  for (std::size_t i = 0; !is_first && i < arguments.size(); ++i) {
+    has_moved[i] = !(arguments[i] == last.arguments[i]);
   }
-  return all;
+  const auto moves = [&](ArgumentId id) { return id != no_argument && has_moved[id]; };
+  last.loads.resize(count);
+  for (std::size_t t = 0; t < count; ++t) {
+    const Assembly::Term& term = assembly_.terms[t];
+    bool is_new = is_first;
+    if (term.is_link) {
+      const auto& used = network_.links[term.element].arguments;
+      is_new = is_new || std::any_of(used.begin(), used.end(), moves);
+    } else {
+      const Mass& mass = network_.masses[term.element];
+      is_new = is_new || moves(mass.mass) || moves(mass.stiffness) || moves(mass.damping);
+    }
+    if (is_new) {
+      last.loads[t] = load_of(network_, term, arguments, rate_ratio_);
+    }
+  }
+  last.arguments.assign(arguments.begin(), arguments.end());
+  return last.loads;
 }
 
 Weights Proofs::weights_for(std::span<const Range> arguments) {
@@ -97,8 +126,9 @@ Weights Proofs::weights_for(std::span<const Range> arguments, const RangeOverrid
     weights.masses = weights_for(changed).masses;
     return weights;
   }
-  const std::vector<Load> before = loads(arguments);
-  const std::vector<Load> after = loads(changed);
+  const std::span<const Load> now = loads(arguments);
+  const std::vector<Load> before(now.begin(), now.end());
+  const std::span<const Load> after = loads(changed);
   for (std::size_t t = 0; t < before.size(); ++t) {
     weights.terms[t] = instead.quantity == Quantity::stiffness
                            ? after[t].stiff + before[t].damped + before[t].rubbed
@@ -182,7 +212,7 @@ Proofs::Course Proofs::course_along(std::size_t parameter) const {
 // --- queries ------------------------------------------------------------------------------------
 
 Verdict Proofs::prove(const ParameterBox& box) {
-  const std::vector<Range> arguments = argument_ranges(network_, box);
+  const std::span<const Range> arguments = ranges(box);
   const Weights weights = weights_for(arguments);
   return boundary_.holds(weights, safe_limit)                            ? Verdict::stable
          : find_invalid_number_in(arguments) || boundary_.fails(weights) ? Verdict::unstable
@@ -194,7 +224,7 @@ Certificate Proofs::certify(const ParameterBox& box) {
   if (verdict == Verdict::stable || !assembly_.is_complete) {
     return {.verdict = verdict};
   }
-  const std::vector<Range> arguments = argument_ranges(network_, box);
+  const std::span<const Range> arguments = ranges(box);
   if (const auto suspect = find_invalid_number_in(arguments)) {
     return {verdict, 0.0, accuse(*suspect, arguments)};
   }
@@ -234,7 +264,7 @@ std::optional<SafeRange> Proofs::safe_range(const ParameterBox& box, std::size_t
     ParameterBox moved = box;
     moved.lowest[parameter] = std::min(side * from, side * to);
     moved.highest[parameter] = std::max(side * from, side * to);
-    return weights_for(argument_ranges(network_, moved));
+    return weights_for(ranges(moved));
   };
   const auto holds = [&](double at) { return boundary_.holds(between(at, at), 4.0); };
   const double size = std::fabs(start);
@@ -284,15 +314,15 @@ double Proofs::share(const ParameterBox& safe, const ParameterBox& wide) {
       box.lowest.push_back(std::lerp(safe.lowest[i], wide.lowest[i], way));
       box.highest.push_back(std::lerp(safe.highest[i], wide.highest[i], way));
     }
-    return weights_for(argument_ranges(network_, box));
+    return weights_for(ranges(box));
   };
   return boundary_.holds(line(1.0), safe_limit) ? 1.0 : boundary_.between(line, 0.0, 1.0).value;
 }
 
 double Proofs::stiffness_factor(const ParameterBox& box) {
-  const std::vector<Range> arguments = argument_ranges(network_, box);
+  const std::span<const Range> arguments = ranges(box);
   const Weights weights = weights_for(arguments);
-  const std::vector<Load> all = loads(arguments);
+  const std::span<const Load> all = loads(arguments);
   const auto line = [&](double factor) {
     Weights scaled = weights;
     for (std::size_t t = 0; t < all.size(); ++t) {
