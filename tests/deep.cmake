@@ -119,7 +119,7 @@ if(NOT RESSORT_ADDRESS_SANITIZER AND NOT RESSORT_THREAD_SANITIZER)
   # Loading and compiling use a single thread and are linked without the sanitizer, and so are the
   # kernels. Whole folders are recompiled, because each folder is one object in the library.
   get_target_property(ressort_shared_sources ressort_core SOURCES)
-  list(FILTER ressort_shared_sources INCLUDE REGEX "^core/(engine|kernels/domains)/")
+  list(FILTER ressort_shared_sources INCLUDE REGEX "^core/(engine|kernels/threads)/")
   get_target_property(ressort_shared_app ressort_app SOURCES)
   list(FILTER ressort_shared_app INCLUDE REGEX "^app/(realtime/.*|session/.*|[^/]*)\\.cpp$")
   list(APPEND ressort_shared_sources ${ressort_shared_app})

@@ -65,7 +65,7 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
       ->check(within(-120.0, 60.0));
   command->add_option("-p,--voices", options.voices, "number of voices (default: the preset's)")
       ->check(within(1, max_voices));
-  command->add_option("--threads", options.threads, "threads for voices and large networks")
+  command->add_option("--threads", options.threads, "threads for voices")
       ->check(within(1, 64))
       ->capture_default_str();
   command

@@ -39,7 +39,7 @@ struct RenderOptions {
   bool limit = false;
   bool force = false;  // renders unstable models
   int voices = 0;
-  int threads = 0;        // threads for large networks; 0: one per core
+  int threads = 0;        // threads for voices; 0: one per core
   Progress loading = {};  // until the first sample; fails with `stopped` if it stops
 };
 

@@ -1,12 +1,12 @@
-// app/realtime: helper threads for packs of many voices and shards of large networks. The caller
-// waits for them when rendering, but never while playing live: see core/kernels/domains/executor.h.
+// app/realtime: helper threads for packs of many voices. The caller waits for them when rendering,
+// but never while playing live: see core/kernels/threads/executor.h.
 #pragma once
 
 #include <thread>
 #include <vector>
 
 #include "app/realtime/lockfree.h"
-#include "core/kernels/domains/executor.h"
+#include "core/kernels/threads/executor.h"
 
 namespace ressort::realtime {
 

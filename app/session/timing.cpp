@@ -33,8 +33,7 @@ void measure(Plan& plan, const Engine& engine, const CompileOptions& options, in
   auto part = plan.parts.begin();
   const Workload load{.is_double = options.precision == Precision::float64,
                       .isa = options.isa,
-                      .voices = voices,
-                      .executor = options.executor};
+                      .voices = voices};
   for (const Program& program : engine.machine().parts) {
     if (program.moving > 0 && part != plan.parts.end()) {
       part->measured_ns = known_ns(program, load, timings).value_or(0.0);

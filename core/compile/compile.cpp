@@ -82,8 +82,7 @@ Planned plan(const CompileRequest& request, const Analysis& analysis, const Proo
       .voices = request.voices,
       .highest_factor = stable,
       .wanted_factor = may_reach ? wanted_factor(request, analysis.shapes->mode, stable) : stable,
-      .is_untuned = options.bare,
-      .executor = options.executor};
+      .is_untuned = options.bare};
   return make_plan(std::move(machine), load,
                    request.is_published() ? Method::direct : options.method, options.most_modes,
                    request.budget, options.progress, make_budget_region(request, analysis, proof),

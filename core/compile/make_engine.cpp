@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/engine/voices.h"
-#include "core/kernels/domains/executor.h"
+#include "core/kernels/threads/executor.h"
 #include "core/kernels/passive/clusters.h"
 #include "core/kernels/registry.h"
 

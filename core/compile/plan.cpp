@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "core/compile/accuracy/springs.h"
-#include "core/kernels/domains/shards.h"
 #include "core/kernels/modal/modal_body.h"
 #include "core/kernels/oversampled/oversampled_form.h"
 
@@ -438,12 +437,6 @@ Planned make_plan(Machine machine, const Workload& load, std::optional<Method> m
                         : chooser.choose();
     if (meter && !part.accuracy) {
       part.accuracy = sum_of(meter->of(program.form), region.merged);
-    }
-    if (auto shards = share_out(program, load, progress)) {
-      program.form = *std::move(shards);
-      part.estimated_ns = estimated_ns(program, load);
-      part.measured_ns = 0.0;
-      part.reason += ", " + description(program);
     }
     part.may_gain |= may_gain;
     if (part.masses > 0) {

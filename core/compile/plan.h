@@ -26,7 +26,7 @@ struct Part {
   Method method = Method::direct;
   std::size_t masses = 0;  // moving masses
   std::size_t links = 0;
-  std::string form;  // form_name() of the kernel's tables, before the part is divided into shards
+  std::string form;  // form_name() of the kernel's tables
   // ns per sample of all voices, with all contacts closed all the time: a rough estimate that is
   // the same on every machine, and the time measured on this machine, 0 if unknown.
   double estimated_ns = 0.0;
@@ -77,7 +77,7 @@ struct Choice {
 };
 
 // Chooses the form of every part of the machine: that of `method` if the part has it, otherwise the
-// cheapest form in the worst case. Large parts are then divided among load.executor if that pays.
+// cheapest form in the worst case.
 //
 // Estimates rank the forms. With choice.timings, the forms with estimates up to four times the best
 // are measured, and a form that is 10 % faster than the first in rank replaces it.

@@ -9,8 +9,7 @@
 #include <vector>
 
 #include "core/engine/mix.h"
-#include "core/kernels/domains/kernel_task.h"
-#include "core/kernels/domains/sharded_form.h"
+#include "core/kernels/threads/kernel_task.h"
 #include "core/kernels/registry.h"
 #include "core/progress.h"
 
@@ -191,7 +190,7 @@ struct Bank : BlockBuffers<T> {
   SharedPart<T> share(std::size_t p, Isa isa, Executor& executor) {
     PartBank<T>& part = parts[p];
     SharedPart<T> together;
-    if (part.kernels.size() < 2 || part.program.form.template is<kernels::Shards>()) {
+    if (part.kernels.size() < 2) {
       return together;
     }
     typename KernelTask<T>::Make make;
@@ -201,7 +200,7 @@ struct Bank : BlockBuffers<T> {
     std::vector<Task*> tasks;
     for (std::unique_ptr<Kernel<T>>& kernel : part.kernels) {
       together.tasks.push_back(std::make_unique<KernelTask<T>>(
-          kernel, static_cast<const BlockBuffers<T>&>(*this), HaloBuffers<T>(), make));
+          kernel, static_cast<const BlockBuffers<T>&>(*this), make));
       tasks.push_back(together.tasks.back().get());
       if (executor.is_live() && !together.tasks.back()->can_copy()) {
         return {};

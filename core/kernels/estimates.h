@@ -1,6 +1,6 @@
 // core/kernels: rough estimates of a kernel's time and memory. They rank the forms of a part before
 // any is measured (measure.h), and decide what needs an order of magnitude only: whether a voice is
-// affordable, whether shards or helpers pay.
+// affordable, whether helpers pay.
 #pragma once
 
 #include <cstddef>
@@ -11,8 +11,6 @@
 #include "core/kernels/program.h"
 
 namespace ressort::kernels {
-
-class Executor;
 
 // ns per operation: a nominal value for all machines; real ones may be two or three times faster or
 // slower. An operation is one instruction, on a whole vector or on one number.
@@ -28,8 +26,6 @@ struct Workload {
   double wanted_factor = 1.0;  // the factor that keys require
   double moving = 0.25;        // fraction of the samples in which any parameter moves
   bool is_untuned = false;     // true if every voice keeps the factor 1
-  // executor among which large parts may be divided; null: one core for all
-  Executor* executor = nullptr;
   bool reaches_beyond() const { return wanted_factor > highest_factor; }
 };
 

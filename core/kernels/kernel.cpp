@@ -73,11 +73,6 @@ bool Kernel<T>::read(std::span<const std::uint32_t>, T*, T*) const {
   return false;
 }
 
-template <class T>
-bool Kernel<T>::write_nodes(std::span<const std::uint32_t>, const T*, const T*) {
-  return false;
-}
-
 template class Coefficients<float>;
 template class Coefficients<double>;
 template class Kernel<float>;

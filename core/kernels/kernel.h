@@ -138,10 +138,6 @@ class Kernel {
   virtual bool save(std::size_t lane, double* x, double* v) const = 0;
   // Copies those of some nodes, [i][lane], without conversion. [audio]
   virtual bool read(std::span<const std::uint32_t> nodes, T* x, T* v) const;
-  // Overwrites the state of some nodes between two blocks. In the next sample links act as if the
-  // nodes had moved there by themselves. All other state stays, to the last bit. Returns false if
-  // the kernel has no state per node. [audio]
-  virtual bool write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v);
   // Adds `changes` to the velocities of nodes (masses, modes of bodies, places on waveguides), as a
   // force on each of them in the next sample would. [audio] O(nodes * modes)
   virtual void strike(std::size_t lane, std::span<const std::uint32_t> nodes,

@@ -140,16 +140,6 @@ bool NodeKernel<T>::read(std::span<const std::uint32_t> nodes, T* x, T* v) const
   return true;
 }
 
-template <class T>
-void NodeKernel<T>::write(std::span<const std::uint32_t> nodes, const T* x, const T* v) {
-  for (const std::uint32_t node : nodes) {
-    for (std::size_t lane = 0; lane < this->width(); ++lane) {
-      nodes_.put(node, lane, static_cast<double>(*x++), static_cast<double>(*v++));
-    }
-  }
-  std::fill(nodes_.passive.awake.begin(), nodes_.passive.awake.end(), T(1));
-}
-
 // A kernel that keeps forces adds the force that causes the change. A kernel that computes forces
 // as the masses move adds the velocity; damping then acts on it in its own sample, by a share Z/M.
 template <class T>

@@ -102,8 +102,6 @@ class NodeKernel : public Kernel<T> {
     nodes_.copy_from(other.nodes_);
     return other;
   }
-  // Writes the state of nodes: write_nodes() without the forces that follow from it.
-  void write(std::span<const std::uint32_t> nodes, const T* x, const T* v);
 
   const Program& program_;
   Nodes<T> nodes_;

@@ -104,9 +104,7 @@ struct AudioParameter {
 // weight.
 struct TapSlot {
   std::uint32_t node = 0;  // node of the point itself
-  // Its first node in Program::tap_nodes, row by row. If the Program has only the nodes around the
-  // point, the index that the first one would have, modulo 2^32.
-  std::uint32_t first = 0;
+  std::uint32_t first = 0;  // its first node in Program::tap_nodes, row by row
   std::uint32_t length = 1;
   std::uint32_t width = 1;
   std::uint32_t u = 0;  // coefficients

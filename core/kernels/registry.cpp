@@ -11,8 +11,6 @@
 #include "core/kernels/chains/chains_form.h"
 #include "core/kernels/direct/direct.h"
 #include "core/kernels/direct/direct_form.h"
-#include "core/kernels/domains/sharded.h"
-#include "core/kernels/domains/sharded_form.h"
 #include "core/kernels/grid/grid.h"
 #include "core/kernels/grid/grid_form.h"
 #include "core/kernels/modal/modal.h"
@@ -84,8 +82,6 @@ constexpr KernelRow rows[] = {
                      ? std::optional(oversampled_form(oversampled_program(r.program, times), times))
                      : std::nullopt;
         }),
-    row<Shards, ShardedKernel>(Method::direct, "shards", Use::given,
-                               [](const Request&) { return std::optional<Shards>(); }),
     row<Direct, DirectKernel>(Method::direct, "direct", Use::published,
                               [](const Request&) { return Direct(); }),
 };
@@ -98,9 +94,8 @@ const KernelRow& row_of(const Form& form) {
 }
 
 const KernelRow& row_of(Method method) {
-  return *std::find_if(std::begin(rows), std::end(rows), [&](const KernelRow& row) {
-    return row.method == method && row.use != Use::given;
-  });
+  return *std::find_if(std::begin(rows), std::end(rows),
+                       [&](const KernelRow& row) { return row.method == method; });
 }
 
 std::string_view method_name(Method method) {
@@ -108,9 +103,8 @@ std::string_view method_name(Method method) {
 }
 
 std::optional<Method> method_named(std::string_view name) {
-  const auto row = std::find_if(std::begin(rows), std::end(rows), [&](const KernelRow& row) {
-    return row.name == name && row.use != Use::given;
-  });
+  const auto row = std::find_if(std::begin(rows), std::end(rows),
+                                [&](const KernelRow& row) { return row.name == name; });
   return row == std::end(rows) ? std::nullopt : std::optional(row->method);
 }
 

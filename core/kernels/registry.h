@@ -36,11 +36,10 @@ struct KernelRow {
   enum class Use {
     published,  // computes the published scheme, possibly in other coordinates
     physical,   // approximates the continuous network better, for a budget or by name
-    given,      // divides other forms among several cores; has no name of its own
   };
 
   Form::Kind kind;  // type of its tables
-  Method method;    // the method, or of a divided form the method of its parts
+  Method method;
   std::string_view name;
   Use use;
   // Makes the tables of a Program; empty if the kernel cannot play it. [any thread but audio]

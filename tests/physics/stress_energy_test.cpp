@@ -19,19 +19,13 @@ class Lab {
     read();
   }
   void set_state(std::vector<double> positions, std::vector<double> velocities) {
-    std::vector<std::uint32_t> all(x.size());
-    for (std::uint32_t node = 0; node < all.size(); ++node) {
-      all[node] = node;
+    for (std::size_t node = 0; node < x.size(); ++node) {
       x[node] = node < positions.size() ? positions[node] : bare.program().position[node];
       v[node] = node < velocities.size() ? velocities[node] : 0.0;
     }
-    const std::size_t lanes = bare.lanes();
-    std::vector<double> wide_x(x.size() * lanes), wide_v(wide_x.size());
-    for (std::size_t i = 0; i < wide_x.size(); ++i) {
-      wide_x[i] = x[i / lanes];
-      wide_v[i] = v[i / lanes];
+    for (std::size_t lane = 0; lane < bare.lanes(); ++lane) {
+      bare.kernel().set_state(lane, x.data(), v.data());
     }
-    REQUIRE(bare.kernel().write_nodes(all, wide_x.data(), wide_v.data()));
   }
   void set(double parameter, bool ramped = false) {
     bare.set_coefficients(0, {parameter}, 1.0, ramped);

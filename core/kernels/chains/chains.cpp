@@ -341,16 +341,6 @@ void ChainsKernel<T>::clear(std::size_t) {
 }
 
 template <class T>
-bool ChainsKernel<T>::write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v) {
-  this->write(nodes, x, v);
-  std::fill(force_.begin(), force_.end(), T(0));
-  ChainsState<T> written = state();
-  loops_.pull(tables_, written);
-  clear_wide_registers();
-  return true;
-}
-
-template <class T>
 bool ChainsKernel<T>::copy_from(const Kernel<T>& from) {
   const auto& other = static_cast<const ChainsKernel&>(this->copy_nodes(from));
   held_ = other.held_;

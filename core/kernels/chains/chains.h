@@ -159,8 +159,6 @@ using ChainsStep = void (*)(const Program& program, const ChainsTables& tables,
 template <class T>
 struct ChainsLoops {
   ChainsStep<T> step;
-  // Adds the links' forces at the current positions.
-  void (*pull)(const ChainsTables& tables, ChainsState<T>& state);
 };
 
 // Returns the functions for packs of this size.
@@ -178,7 +176,6 @@ template <class T>
 class ChainsKernel final : public NodeKernel<T> {
  public:
   ChainsKernel(const Program& program, const Chains& form, std::size_t voices, Isa isa);
-  bool write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v) override;
   bool copy_from(const Kernel<T>& from) override;
 
  private:

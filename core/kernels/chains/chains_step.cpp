@@ -355,18 +355,10 @@ void step(const Program& program, const ChainsTables& tables, ChainsState<T>& st
   }
 }
 
-// Flattened, so that the link loops in step() are the only instances of their kind and get inlined
-// there.
-template <class S, class T>
-[[gnu::flatten]] void pull_alone(const ChainsTables& tables, ChainsState<T>& state) {
-  S s(tables, state);
-  pull(s);
-}
-
 template <class T>
 ChainsLoops<T> loops_for(std::size_t bytes) {
   return with_bytes<vector_bytes(Isa::RESSORT_ISA)>(bytes, []<std::size_t pack>() {
-    return ChainsLoops<T>{step<View<T, pack>, T>, pull_alone<View<T, pack>, T>};
+    return ChainsLoops<T>{step<View<T, pack>, T>};
   });
 }
 

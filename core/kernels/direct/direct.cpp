@@ -21,19 +21,6 @@ DirectState<T> DirectKernel<T>::state() {
 }
 
 template <class T>
-bool DirectKernel<T>::write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v) {
-  if (loops_.pull == nullptr) {
-    return false;
-  }
-  this->write(nodes, x, v);
-  this->nodes_.fill_row(2, T(0));
-  DirectState<T> written = state();
-  loops_.pull(this->program_, written);
-  clear_wide_registers();
-  return true;
-}
-
-template <class T>
 void DirectKernel<T>::play(const Block<T>& block) {
   rails_.prepare(this->coefficients.value.data());
   DirectState<T> played = state();

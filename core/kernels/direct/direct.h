@@ -59,8 +59,6 @@ struct DirectState {
 template <class T>
 struct DirectLoops {
   void (*step)(const Program& program, DirectState<T>& state, const Block<T>& block);
-  // Adds the forces of the links at the current positions.
-  void (*pull)(const Program& program, DirectState<T>& state);
 };
 
 // Returns the loops for lanes that fill `bytes` bytes.
@@ -71,7 +69,6 @@ template <class T>
 class DirectKernel final : public NodeKernel<T> {
  public:
   DirectKernel(const Program& program, const Direct& form, std::size_t voices, Isa isa);
-  bool write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v) override;
   bool copy_from(const Kernel<T>& from) override {
     this->copy_nodes(from);
     return rails_.is_empty();

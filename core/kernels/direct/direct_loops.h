@@ -339,16 +339,10 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
   }
 }
 
-template <class S, class T>
-void pull_alone(const Program& program, DirectState<T>& state) {
-  S s(state);
-  pull(program, s);
-}
-
 template <class T>
 DirectLoops<T> loops_for(std::size_t bytes) {
   return with_bytes<vector_bytes(Isa::RESSORT_ISA)>(bytes, []<std::size_t pack>() {
-    return DirectLoops<T>{step<View<T, pack>, T>, pull_alone<View<T, pack>, T>};
+    return DirectLoops<T>{step<View<T, pack>, T>};
   });
 }
 

@@ -98,30 +98,6 @@ void GridKernel<T>::clear(std::size_t) {
 }
 
 template <class T>
-bool GridKernel<T>::write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v) {
-  this->write(nodes, x, v);
-  if (!grid_.segments.empty()) {
-    const auto& spring = this->program_.link_runs[grid_.spring_run].coefficients;
-    const T stiffness = this->coefficients.value[spring[0]];
-    const T damping = this->coefficients.value[spring[1]];
-    for (std::size_t i = 0; i < nodes.size(); ++i) {
-      const std::size_t slot = grid_.slot[nodes[i]];
-      if (slot - grid_.first < grid_.count) {
-        y_[slot + (is_forward_ ? shift_ : 0)] = stiffness * x[i] + damping * v[i];
-      }
-    }
-  }
-  this->nodes_.fill_row(2, T(0));
-  pushes_ = 0;
-  GridState<T> written = state();
-  loops_.pull(this->program_, grid_, written);
-  is_fresh_ = written.is_fresh;
-  pushes_ = written.pushes;
-  clear_wide_registers();
-  return true;
-}
-
-template <class T>
 bool GridKernel<T>::copy_from(const Kernel<T>& from) {
   const auto& other = static_cast<const GridKernel&>(this->copy_nodes(from));
   y_ = other.y_;

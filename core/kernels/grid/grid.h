@@ -44,8 +44,6 @@ template <class T>
 struct GridLoops {
   void (*step)(const Program& program, const Grid& grid, GridState<T>& state,
                const Block<T>& block);
-  // Adds the links' forces at the current positions.
-  void (*pull)(const Program& program, const Grid& grid, GridState<T>& state);
 };
 
 // Returns the functions for packs of this size, which must be a full register.
@@ -56,7 +54,6 @@ template <class T>
 class GridKernel final : public NodeKernel<T> {
  public:
   GridKernel(const Program& program, const Grid& grid, std::size_t voices, Isa isa);
-  bool write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v) override;
   bool copy_from(const Kernel<T>& from) override;
 
  private:

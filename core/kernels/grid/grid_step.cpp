@@ -512,19 +512,12 @@ void step(const Program& program, const Grid& grid, GridState<T>& state, const B
   }
 }
 
-template <class T, std::size_t Bytes>
-void pull_alone(const Program& program, const Grid& grid, GridState<T>& state) {
-  const View<T, Bytes> s{program, grid, state};
-  hold(s);
-  pull(s);
-}
-
 template <class T>
 GridLoops<T> loops_for(std::size_t bytes) {
   constexpr std::size_t widest = vector_bytes(Isa::RESSORT_ISA);
   return with_bytes < widest,
          widest == 64 ? 32 : widest > (bytes, []<std::size_t pack>() {
-                               return GridLoops<T>{step<T, pack>, pull_alone<T, pack>};
+                               return GridLoops<T>{step<T, pack>};
                              });
 }
 

@@ -21,8 +21,7 @@
 #include "app/session/loader.h"
 #include "core/compile/compile.h"
 #include "core/compile/make_engine.h"
-#include "core/kernels/domains/kernel_task.h"
-#include "core/kernels/domains/sharded_form.h"
+#include "core/kernels/threads/kernel_task.h"
 #include "core/kernels/registry.h"
 #include "tests/support/harness.h"
 #include "tests/support/heap.h"
@@ -256,7 +255,7 @@ TEST_CASE("a task that is taken over continues as without a helper", "[helpers]"
     buffers.audio.resize(64);
     buffers.outputs.resize(64 * found->width() * program.outputs.size());
     BlockBuffers<double> alone = buffers;
-    KernelTask<double> task(found, buffers, {}, make);
+    KernelTask<double> task(found, buffers, make);
     REQUIRE(task.can_copy());
     for (auto* kernel : {expected.get(), found.get()}) {
       for (std::uint32_t c = 0; c < program.coefficients.size(); ++c) {
@@ -382,36 +381,6 @@ TEST_CASE("the memory of the helpers' copies is predicted", "[helpers]") {
     CAPTURE(executor != nullptr, taken, told);
     CHECK(told > 0.5 * taken);
     CHECK(told < 2.0 * taken);
-  }
-}
-
-TEST_CASE("helpers play the shards of a large network with the same bits", "[helpers]") {
-  const std::string text =
-      "@K param 0.2\n@p closedMesh 120 100 1. K 0.003 0. 0.\n@in1 frcInput [@p 0.4 0.3]\n"
-      "@out1 posOutput [@p 0.51 0.7]\n";
-  const auto network = support::network_of(text);
-  const auto preset = default_preset(network, false);
-  const auto made = [&](Executor* executor) {
-    auto compiled = compile_network(
-        network, preset,
-        {.rate_hz = 48000.0, .voices = 2, .method = Method::direct, .executor = executor});
-    REQUIRE(compiled);
-    return std::move(compiled->engine);
-  };
-  SeqLock<ClockReading> clock;
-  const std::vector<double> expected = played(*made(nullptr), clock, 3000, 0);
-  CHECK(*std::max_element(expected.begin(), expected.end()) > 1e-3);
-  for (const std::size_t threads : {2u, 3u}) {
-    const Threads before = own_threads();
-    ThreadPool pool(threads, &clock);
-    Threads helpers = own_threads();
-    for (const int thread : before) {
-      helpers.erase(thread);
-    }
-    const auto engine = made(&pool);
-    CHECK(engine->machine().parts[0].form.is<Shards>());
-    const Stalls stalls(helpers, 500);
-    CHECK(played(*engine, clock, 3000, 0) == expected);
   }
 }
 
