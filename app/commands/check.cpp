@@ -314,10 +314,7 @@ void print_report(const Scene& scene, const Compiled& compiled, const Proved& pr
   }
   std::printf("methods:\n  %s", describe(compiled.plan).c_str());
   if (instrument.mode) {
-    const int number = scene.preset.pitch_mode;
-    const bool is_lowest = number == 1 || has_waveguide(scene.network);
-    const std::string mode = is_lowest ? "lowest mode" : "mode " + std::to_string(number);
-    std::printf("%s %.3f Hz; keys sound up to %.0f Hz, higher keys are silent\n", mode.c_str(),
+    std::printf("lowest mode %.3f Hz; keys sound up to %.0f Hz, higher keys are silent\n",
                 instrument.mode->frequency_hz, instrument.highest_frequency_hz);
   }
   std::printf("%s\n", conclusion(scene, proved).c_str());

@@ -443,7 +443,6 @@ class SceneReader {
       scene.network =
           with_even_decay(*std::move(network), {.parameter = static_cast<std::size_t>(position),
                                                 .stops = stops.size(),
-                                                .pitch_mode = preset.pitch_mode,
                                                 .values = values,
                                                 .progress = options_.progress});
     } catch (const Stopped&) {

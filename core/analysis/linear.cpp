@@ -279,7 +279,7 @@ class Spectrum {
   bool is_factored_ = false;
 };
 
-// The lowest eigenpairs and the index of the requested one: the `number`th above the rigid motions.
+// The lowest eigenpairs and the index of the first one above the rigid motions.
 struct Lowest {
   Eigenpairs pairs;
   std::size_t first = 0;
@@ -287,17 +287,17 @@ struct Lowest {
 
 // Tries with `wanted` pairs, which usually suffice, then with more.
 std::optional<Lowest> lowest_pairs(Spectrum& spectrum, const SparseMatrix& lower, double stiffest,
-                                   int wanted, int number) {
+                                   int wanted) {
   const double floor = rigid * stiffest;
-  for (const int count : {wanted + number - 1, number, number + 5}) {
+  for (const int count : {wanted, 1, 6}) {
     const std::optional<Eigenpairs> pairs = spectrum.near_zero(std::min(count, lower.size() - 1));
     if (!pairs) {
       continue;
     }
     const auto above = std::find_if(std::begin(pairs->values), std::end(pairs->values),
                                     [&](double value) { return value > floor; });
-    if (std::end(pairs->values) - above >= number) {
-      const auto first = static_cast<std::size_t>(above - std::begin(pairs->values) + number - 1);
+    if (above != std::end(pairs->values)) {
+      const auto first = static_cast<std::size_t>(above - std::begin(pairs->values));
       return is_pair(lower, pairs->values[first], pairs->vectors.column(first),
                      tolerance * stiffest)
                  ? std::optional(Lowest{*pairs, first})
@@ -394,7 +394,7 @@ double scheme_frequency_hz(double stiffness, double damping, double rate_hz) {
 
 std::optional<LowestShapes> lowest_shapes(const Network& network,
                                           std::span<const double> parameters,
-                                          const Progress& progress, int number) {
+                                          const Progress& progress) {
   const Body whole(network, parameters);
   const std::optional<Network> still = fixed_held(network);
   const Body body(still ? *still : network, parameters);
@@ -409,7 +409,7 @@ std::optional<LowestShapes> lowest_shapes(const Network& network,
   // The shift is slightly below 0, so that networks with rigid motions can be factored, too.
   Spectrum spectrum(stiffness, -1e3 * rigid * stiffest, progress);
   const std::optional<Lowest> lowest =
-      lowest_pairs(spectrum, stiffness, stiffest, static_cast<int>(most_shapes), number);
+      lowest_pairs(spectrum, stiffness, stiffest, static_cast<int>(most_shapes));
   if (!lowest) {
     return std::nullopt;
   }

@@ -45,10 +45,10 @@ struct LowestShapes {
   double share_of_modes = 0.0;  // Share of bodies in the lowest mode's motion, 0 to 1.
 };
 
-// Returns the reduced network for the same networks and in the same time as lowest_mode(), for the
-// lowest mode or for mode number `number` (1 is the lowest). [any thread but audio]
+// Returns the reduced network for the same networks and in the same time as lowest_mode(). [any
+// thread but audio]
 std::optional<LowestShapes> lowest_shapes(const Network& network,
                                           std::span<const double> parameters,
-                                          const Progress& progress = {}, int number = 1);
+                                          const Progress& progress = {});
 
 }  // namespace ressort::analysis

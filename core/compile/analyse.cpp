@@ -86,7 +86,7 @@ std::optional<LowestShapes> find_shapes(const CompileRequest& request, const Net
   if (!network.waveguides.empty()) {
     return waveguide_shapes(network, parameters);
   }
-  return lowest_shapes(network, parameters, request.options.progress, request.preset.pitch_mode);
+  return lowest_shapes(network, parameters, request.options.progress);
 }
 
 Result<Analysis> analyse(const CompileRequest& request, const Network& network) {

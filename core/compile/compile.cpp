@@ -119,7 +119,7 @@ BowCheck check_bows(const CompileRequest& request, const Network& network, const
 
 // Returns the reason why keys do not set the pitch although the preset has a keyboard; may be
 // empty.
-std::string reason_without_mode(const Network& network, const Preset& preset) {
+std::string reason_without_mode(const Network& network) {
   const std::size_t masses = moving_count(network);
   if (masses > most_quick_masses) {
     return "finding the lowest mode of " + std::to_string(masses) + " masses takes too long";
@@ -127,7 +127,7 @@ std::string reason_without_mode(const Network& network, const Preset& preset) {
   if (!network.waveguides.empty()) {
     return "every waveguide is fixed";
   }
-  return preset.pitch_mode > 1 ? "there is no mode " + std::to_string(preset.pitch_mode) : "";
+  return "";
 }
 
 // Returns the notes about the computation of the network that are not about a single part.
@@ -145,7 +145,7 @@ std::vector<std::string> make_notes(const CompileRequest& request, const Reduced
         "would take too long");
   }
   if (request.preset.keyboard && !keys.mode) {
-    const std::string reason = reason_without_mode(reduced.network, request.preset);
+    const std::string reason = reason_without_mode(reduced.network);
     if (!reason.empty()) {
       notes.push_back("keys do not set the pitch: " + reason);
     }

@@ -144,7 +144,6 @@ std::vector<std::string> fixed_labels(const Network& network) {
 void play(const Network& network) {
   Preset preset = default_preset(network, false);
   preset.fixed = fixed_labels(network);
-  preset.pitch_mode = 1 + static_cast<int>(network.masses.size() % most_pitch_mode);
   play(network, preset, {.rate_hz = 48000.0, .most_modes = quick_modes, .find_gain = true});
   play(network, default_preset(network, true), {.rate_hz = 44100.0, .bare = true});
   const std::size_t turn = network.links.size() + 7 * network.masses.size();

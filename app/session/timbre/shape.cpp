@@ -198,7 +198,6 @@ Result<Shaped> shape_timbre(const ShapeRequest& request, std::vector<TimbreTarge
   }
   StrikeOptions options{.rate_hz = request.rate_hz,
                         .blows = blows_of(request),
-                        .pitch_mode = static_cast<std::size_t>(preset.pitch_mode - 1),
                         .has_attack = std::any_of(targets.begin(), targets.end(),
                                                   [](const TimbreTarget& target) {
                                                     return target.figure == TargetFigure::attack;

@@ -79,7 +79,7 @@ class DecayEvener {
   // Returns the logarithm of the mode's damping, which is proportional to 1/T60.
   std::optional<double> log_damping(double position) {
     values_[morph_.parameter] = position;
-    const auto shapes = lowest_shapes(expanded_, values_, morph_.progress, morph_.pitch_mode);
+    const auto shapes = lowest_shapes(expanded_, values_, morph_.progress);
     return shapes && shapes->mode.damping > 0.0 ? std::optional(std::log(shapes->mode.damping))
                                                 : std::nullopt;
   }

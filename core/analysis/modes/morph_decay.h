@@ -12,7 +12,6 @@ namespace ressort::analysis {
 struct MorphedDecay {
   std::size_t parameter = 0;       // The morph's parameter, which runs from 1 to the number
   std::size_t stops = 2;           // of stops.
-  int pitch_mode = 1;              // Number of the mode that keys tune.
   std::span<const double> values;  // [parameter]
   Progress progress = {};
 };

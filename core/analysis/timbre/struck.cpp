@@ -193,11 +193,10 @@ Result<StruckModel::Tuned> StruckModel::tuned(std::span<const double> parameters
     if (!options_.key_hz) {
       return Tuned{*std::move(modes), factor};
     }
-    if (options_.pitch_mode >= modes->size()) {
-      return Error{"there is no mode " + std::to_string(options_.pitch_mode + 1) +
-                   " that oscillates, so keys cannot set the pitch"};
+    if (modes->empty()) {
+      return Error{"no mode oscillates, so keys cannot set the pitch"};
     }
-    const ModeTone tone = (*modes)[options_.pitch_mode].tone;
+    const ModeTone tone = modes->front().tone;
     if (std::fabs(tone.frequency_hz / *options_.key_hz - 1.0) < in_tune) {
       factor_ = factor;
       return Tuned{*std::move(modes), factor};
@@ -364,7 +363,7 @@ Result<TargetValues> StruckModel::figures_of(const Tuned& tuned, StruckAs how) c
       partials.begin(), partials.end(),
       [&](const DecayingPartial& partial) { return partial.residue > least_residue * loudest; });
   const std::size_t pitch =
-      options_.key_hz ? options_.pitch_mode : static_cast<std::size_t>(heard - partials.begin());
+      options_.key_hz ? 0 : static_cast<std::size_t>(heard - partials.begin());
   TargetValues values;
   const auto set = [&](TargetFigure figure, std::optional<double> value) {
     const bool is_there =

@@ -79,7 +79,6 @@ struct StrikeOptions {
   // If set, every stiffness that is not fixed is scaled so that the mode has this frequency, as a
   // key does. Otherwise the model is used as written.
   std::optional<double> key_hz;
-  std::size_t pitch_mode = 0;  // Counted from the lowest oscillating mode.
   // Samples from the strike on, analysed as amplitudes under a Hann window.
   std::size_t frame = 2048;
   bool has_attack = false;  // The attack needs more of the sound than one frame.

@@ -912,7 +912,6 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
   }
   reader.flag("noise", preset.noise);
   reader.integer("transpose", preset.transpose, -most_transpose, most_transpose);
-  reader.integer("pitch_mode", preset.pitch_mode, 1, most_pitch_mode);
   if (reader.text("tuned_along", preset.tuned_along)) {
     preset.tuned_along_location = location_of(*root.get("tuned_along"));
   }

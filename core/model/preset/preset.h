@@ -126,8 +126,7 @@ struct Preset {
   bool noise = false;               // the outputs modulate white noise
   bool keyboard = true;             // keys set the pitch
   int transpose = 0;                // semitones
-  int pitch_mode = 1;               // the mode that keys tune, 1 is the lowest
-  // Flattening of the sound against that mode, which keys compensate: keys and cents, ascending.
+  // Flattening of the sound against the lowest mode, which keys compensate: keys and cents, ascending.
   std::vector<CurvePoint> flattening_cents;
   std::string tuned_along;  // parameter along which keys stay in tune; empty: none
   SourceLocation tuned_along_location;
@@ -159,7 +158,6 @@ inline constexpr int max_voices = 256;
 inline constexpr std::size_t most_morph_stops = 16;
 inline constexpr std::size_t most_lfos = 8;
 inline constexpr std::size_t most_bodies = 8;  // models of `through`
-inline constexpr int most_pitch_mode = 16;
 inline constexpr std::size_t max_preset_bytes = std::size_t{64} << 10;
 inline constexpr std::size_t most_preset_errors = 100;
 

@@ -19,7 +19,6 @@ constexpr PresetKey keys[] = {
     {"", "tuning", "`keyboard` or `fixed` (`keyboard`)", "`keyboard`: a key sets the pitch; `fixed`: every key plays the model as written"},
     {"", "fixed", "[\"LABEL\", ...]", "labels of bodies, waveguides, macros, oscillators and links that keys do not retune, such as a guitar's box"},
     {"", "flattening_cents", "-100 to 100 (0), or [[48, 8], [96, 6]]", "amount by which the sound is flatter than its lowest mode, as under a bow; keys compensate for it. Or up to 16 points of key and cents, joined by straight lines"},
-    {"", "pitch_mode", "1 to 16 (1)", "the mode that a key tunes, counted from the lowest; for a bell, the mode that is heard as its pitch"},
     {"", "tuned_along", "text", "a parameter in `[parameters]` that keys compensate for, such as a damper that would flatten them; the parameter of a `[morph]` always is"},
     {"", "transpose", "-96 to 96 (0)", "semitones added to each key; `--transpose` adds more"},
     {"", "a4_hz", "220 to 880 (440)", "frequency of the A above middle C, Hz"},

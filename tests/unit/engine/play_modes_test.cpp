@@ -335,37 +335,6 @@ TEST_CASE("a velocity curve shapes the touch and keeps its end points", "[play_m
   CHECK(loudness(0.0, 1.0, points, true) == Approx(0.6 * full));
 }
 
-TEST_CASE("a pitch mode that does not exist is reported", "[play_modes]") {
-  Preset preset = struck(1);
-  preset.pitch_mode = 2;
-  const auto made = compile_network(
-      network_of("@o osc 1. 0.1 0.001 0. 0.\n@in1 frcInput @o\n@out1 posOutput @o\n"), preset, {});
-  REQUIRE(made);
-  CHECK_FALSE(made->instrument.mode);
-  REQUIRE(made->plan.notes.size() == 1);
-  CHECK(made->plan.notes[0] == "keys do not set the pitch: there is no mode 2");
-}
-
-TEST_CASE("a preset names the mode that sets its pitch", "[play_modes]") {
-  for (const int number : {1, 2, 3, 5, 8}) {
-    Preset preset = struck(1);
-    preset.pitch_mode = number;
-    Player player(ringing_string(), preset);
-    player.run(60000, {note_on(0, 69)});
-    // Eleven equal springs: mode n has the frequency 2 sqrt(K) sin(n pi / 22).
-    const double shape = std::sin(number * std::numbers::pi / 22.0);
-    const double first_hz = 440.0 * std::sin(std::numbers::pi / 22.0) / shape;
-    const std::span<const double> late = std::span(player.y()).subspan(4000);
-    CAPTURE(number);
-    CHECK(1200.0 * std::log2(measured_hz(late, rate_hz, first_hz) / first_hz) ==
-          Approx(0.0).margin(1.0));  // dispersion of the scheme between the two
-    if (number != 8) {               // The strike excited it, but it has decayed by then.
-      CHECK(1200.0 * std::log2(measured_hz(late, rate_hz, 440.0) / 440.0) ==
-            Approx(0.0).margin(0.05));
-    }
-  }
-}
-
 TEST_CASE("tuning points by key compensate a sound that is flat of its mode", "[play_modes]") {
   Preset preset = struck(1);
   preset.transpose = -12;
