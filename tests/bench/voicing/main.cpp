@@ -5,10 +5,12 @@
 //  ressort_voicing --bows N [PRESET...]                bows: N speeds and N pressures, 24 keys
 //  ressort_voicing --restrikes KEY [PRESET...]         level of a ringing note after a soft strike
 //  ressort_voicing --tuner RATE [PRESET...]            pitch of every semitone by YIN
+//  ressort_voicing [--seconds S] FILE.mid... [PRESET...]
+//                                                      MIDI files, each to its end or for S seconds
 //
-// Without names, all presets are measured. STEP is the distance in semitones between the keys whose
-// pitch is measured, from 21 to 108 (default 12). The table is Markdown. The sound is measured
-// before the limiter.
+// Without names, all presets are measured, or, with MIDI files, ten. STEP is the distance in
+// semitones between the keys whose pitch is measured, from 21 to 108 (default 12). The table is
+// Markdown. The sound is measured before the limiter.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -20,9 +22,11 @@
 #include <vector>
 
 #include "app/commands/offline.h"
+#include "app/commands/smf/midi_file.h"
 #include "app/control/registry.h"
 #include "app/session/files.h"
 #include "core/engine/limiter.h"
+#include "tests/bench/voicing/midi_files.h"
 #include "tests/bench/voicing/player.h"
 #include "tests/bench/voicing/random_settings.h"
 #include "tests/bench/voicing/restrikes.h"
@@ -208,8 +212,13 @@ Row measure(const std::string& name, int step) {
   const double chord_db = decibels(peak_of(ten));
   cell(chord_db, 1, chord_db < 0.0);
   cell(limiting_db(ten), 1, chord_db < 0.0);
-  const double cost = player.real_time_share(0.5);
-  cell(100.0 * cost / player.instrument().voices, 2, cost < 0.7);
+  const int voices = player.instrument().voices;
+  const double cost = player.real_time_share(0.5, voices);
+  const double one = player.real_time_share(0.5, 1);
+  const double voice = voices > 1 ? std::max(0.0, (cost - one) / (voices - 1)) : one;
+  cell(100.0 * voice, 2, true);
+  cell(100.0 * std::max(0.0, one - voice), 1, true);
+  cell(100.0 * cost, 0, cost < 0.7);
   return row;
 }
 
@@ -222,10 +231,31 @@ void print(const std::vector<std::string>& cells) {
 }
 
 int print_table(const std::vector<std::string>& names, int step) {
-  const std::vector<std::string> head = {
-      "preset",         "peak 20", "64",          "100",     "127",    "keys dB",    "LUFS", "ms",
-      "T60 s",          "let go",  "centroid 20", "64",      "127",    "c 44.1",     "c 48", "c 96",
-      "unheard/silent", "DC dB",   "corr",        "mono dB", "ten dB", "limiter dB", "CPU %"};
+  const std::vector<std::string> head = {"preset",
+                                         "peak 20",
+                                         "64",
+                                         "100",
+                                         "127",
+                                         "keys dB",
+                                         "LUFS",
+                                         "ms",
+                                         "T60 s",
+                                         "let go",
+                                         "centroid 20",
+                                         "64",
+                                         "127",
+                                         "c 44.1",
+                                         "c 48",
+                                         "c 96",
+                                         "unheard/silent",
+                                         "DC dB",
+                                         "corr",
+                                         "mono dB",
+                                         "ten dB",
+                                         "limiter dB",
+                                         "CPU %",
+                                         "body",
+                                         "all"};
   print(head);
   print(std::vector<std::string>(head.size(), "---"));
   std::vector<double> loudness;
@@ -298,6 +328,8 @@ int bow(const std::string& name, int count) {
 
 int run(int argc, char** argv) {
   std::vector<std::string> names;
+  std::vector<std::string> files;
+  double seconds = 0.0;
   int step = 12;
   int random = 0;
   int bows = 0;
@@ -320,25 +352,34 @@ int run(int argc, char** argv) {
       restrikes = std::atoi(argv[++i]);
     } else if (word == "--tuner") {
       tuner_hz = std::atof(argv[++i]);
+    } else if (word == "--seconds") {
+      seconds = std::atof(argv[++i]);
     } else if (word == "--seed") {
       seed = std::strtoull(argv[++i], nullptr, 10);
     } else if (word.starts_with("--")) {
       std::fprintf(stderr, "unknown option %s\n", word.c_str());
       return 2;
     } else {
-      names.push_back(word);
+      (is_midi_file_name(word) ? files : names).push_back(word);
     }
   }
-  if (names.empty()) {
+  if (names.empty() && !files.empty()) {
+    names = {"Piano",          "Harp",       "Harpsichord", "NylonGuitar", "SteelGuitar",
+             "ElectricGuitar", "BassGuitar", "Violin",      "Vibraphone",  "Marimba"};
+  } else if (names.empty()) {
     names = known_presets();
   }
-  if (random == 0 && bows == 0 && restrikes == 0 && tuner_hz == 0.0) {
+  if (!files.empty()) {
+    print_midi_head();
+  } else if (random == 0 && bows == 0 && restrikes == 0 && tuner_hz == 0.0) {
     return print_table(names, step) == 0 ? 0 : 1;
   }
   int failures = 0;
   for (const std::string& name : names) {
     try {
-      if (bows > 0) {
+      if (!files.empty()) {
+        failures += play_midi_files(name, files, seconds);
+      } else if (bows > 0) {
         failures += bow(name, bows);
       } else if (restrikes > 0) {
         Player player(name, 44100.0);

@@ -32,8 +32,9 @@ class Player {
   // sorted by time.
   Stereo play(const std::vector<TimedEvent>& events, double seconds);
   Stereo continue_playing(double seconds);  // Continues with the voices that sound.
-  // Returns the share of one core that all voices with one note each take.
-  double real_time_share(double seconds);
+  // Returns the share of one core that a number of voices, each with a note, and the bodies take
+  // in the first seconds of these notes.
+  double real_time_share(double seconds, int voices);
 
   const Scene& scene() const { return scene_; }
   const Instrument& instrument() const { return compiled_.instrument; }
