@@ -1,6 +1,8 @@
 #include "app/commands/smf/midi_file.h"
 
 #include <algorithm>
+#include <array>
+#include <bitset>
 #include <cctype>
 #include <optional>
 
@@ -281,7 +283,67 @@ Result<MidiFile> parse_midi_file(Bytes file) {
         break;
     }
   }
+  release_all(midi);
   return midi;
+}
+
+void release_all(MidiFile& midi) {
+  constexpr std::array<std::uint8_t, 2> pedals = {64, 66};  // sustain, sostenuto
+  constexpr std::uint8_t first_mode_message = 120;          // 120, 123 and above release all keys
+  constexpr std::uint8_t reset_controllers = 121;           // also lifts the pedals
+  constexpr std::uint8_t local_control = 122;
+  struct Channel {
+    std::bitset<128> keys;
+    std::bitset<pedals.size()> pressed;
+  };
+  std::array<Channel, 16> channels;
+  for (const MidiFile::Message& message : midi.messages) {
+    const auto bytes = midi.bytes_of(message);
+    constexpr std::uint8_t highest_data = 127;  // an escaped SysEx message has any bytes
+    if (bytes.size() != 3 || bytes[1] > highest_data) {
+      continue;
+    }
+    Channel& channel = channels[bytes[0] & 0x0f];
+    const std::uint8_t number = bytes[1];
+    switch (bytes[0] & 0xf0) {
+      case 0x80:
+        channel.keys.reset(number);
+        break;
+      case 0x90:
+        channel.keys.set(number, bytes[2] > 0);
+        break;
+      case 0xb0:
+        for (std::size_t i = 0; i < pedals.size(); ++i) {
+          channel.pressed[i] = number == pedals[i] ? bytes[2] > 0 : channel.pressed[i];
+        }
+        if (number == reset_controllers) {
+          channel.pressed.reset();
+        } else if (number >= first_mode_message && number != local_control) {
+          channel.keys.reset();
+        }
+        break;
+      default:
+        break;
+    }
+  }
+  const auto append = [&](int status, std::size_t number, std::uint8_t value) {
+    midi.messages.push_back({midi.length_s, static_cast<std::uint32_t>(midi.bytes.size()), 3});
+    midi.bytes.insert(midi.bytes.end(), {static_cast<std::uint8_t>(status),
+                                         static_cast<std::uint8_t>(number), value});
+  };
+  for (int c = 0; c < 16; ++c) {
+    const Channel& channel = channels[static_cast<std::size_t>(c)];
+    for (std::size_t key = 0; key < channel.keys.size(); ++key) {
+      if (channel.keys[key]) {
+        append(0x80 | c, key, 64);
+      }
+    }
+    for (std::size_t i = 0; i < pedals.size(); ++i) {
+      if (channel.pressed[i]) {
+        append(0xb0 | c, pedals[i], 0);
+      }
+    }
+  }
 }
 
 Result<MidiFile> read_midi_file(const std::string& path) {

@@ -32,9 +32,13 @@ struct MidiFile {
 
 // Parses channel messages and SysEx and converts ticks to seconds. Ignores other meta events, other
 // chunks, and bytes after the last track. Running status continues after meta events, as most
-// programs write it. Errors have the offset of the wrong byte, from 0. Fails for files of type 2
-// and for files longer than a day. O(n log n) in the size of the file.
+// programs write it. Releases at the end the keys and pedals that the file leaves down. Errors have
+// the offset of the wrong byte, from 0. Fails for files of type 2 and for files longer than a day.
+// O(n log n) in the size of the file.
 Result<MidiFile> parse_midi_file(std::span<const std::uint8_t> file);
+
+// Appends messages at the end that release all keys and pedals that are still down.
+void release_all(MidiFile& midi);
 
 // Reads and parses a file. Errors have its name.
 Result<MidiFile> read_midi_file(const std::string& path);

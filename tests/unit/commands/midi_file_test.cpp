@@ -67,12 +67,13 @@ TEST_CASE("Running status, a tempo change and long times are parsed", "[midi_fil
                                           0x81, 0x40, 0xc3, 5,                      // 192 ticks
                                           0,    7} +  // running status again
                                     end));
-  REQUIRE(midi.messages.size() == 5);
+  REQUIRE(midi.messages.size() == 6);
   check(midi, 0, 0.0, {0x93, 60, 100});
   check(midi, 1, 0.25, {0x93, 60, 0});
   check(midi, 2, 0.75, {0x93, 62, 1});
   check(midi, 3, 2.75, {0xc3, 5});
   check(midi, 4, 2.75, {0xc3, 7});
+  check(midi, 5, 2.75, {0x83, 62, 64});  // the file leaves this key down
   CHECK(std::fabs(midi.length_s - 2.75) < 1e-12);
 }
 
@@ -97,6 +98,25 @@ TEST_CASE("SMPTE times ignore the tempo", "[midi_file]") {
   check(read(header(0, 1, (256 - 25) << 8 | 40) + events), 0, 1.0, {0x90, 1, 1});
   check(read(header(0, 1, (256 - 29) << 8 | 40) + events), 0, 25.0 * 1001.0 / 30000.0,
         {0x90, 1, 1});
+}
+
+TEST_CASE("Keys and pedals that a file leaves down are released at its end", "[midi_file]") {
+  const MidiFile midi = read(header(0, 1, 96) + track(Bytes{0,  0x90, 60,   1,    //
+                                                            0,  0x90, 62,   1,    //
+                                                            0,  0x91, 62,   1,    //
+                                                            0,  0x95, 64,   1,    //
+                                                            0,  0xb0, 64,   127,  // sustain
+                                                            0,  0xb1, 64,   127,  //
+                                                            0,  0xb2, 66,   1,    // sostenuto
+                                                            0,  0x80, 60,   0,    //
+                                                            0,  0xb1, 64,   0,    //
+                                                            0,  0xb5, 123,  0,    // all notes off
+                                                            96, 0xff, 0x2f, 0}));
+  REQUIRE(midi.messages.size() == 14);
+  check(midi, 10, 0.5, {0x80, 62, 64});
+  check(midi, 11, 0.5, {0xb0, 64, 0});
+  check(midi, 12, 0.5, {0x81, 62, 64});
+  check(midi, 13, 0.5, {0xb2, 66, 0});
 }
 
 TEST_CASE("Whole, divided and escaped SysEx messages are passed on", "[midi_file]") {
@@ -144,7 +164,7 @@ TEST_CASE("Errors of a MIDI file have the offset of the byte", "[midi_file]") {
 }
 
 TEST_CASE("A track may end without an end-of-track event", "[midi_file]") {
-  CHECK(read(header(0, 1, 96) + track({0, 0x90, 60, 1})).messages.size() == 1);
+  CHECK(read(header(0, 1, 96) + track({0, 0xc0, 5})).messages.size() == 1);
   CHECK(read(header(0, 1, 96) + track({})).messages.empty());
 }
 
