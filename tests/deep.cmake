@@ -44,7 +44,8 @@ add_deep_test(heard_pitch_everywhere 120 $<TARGET_FILE:ressort_tests> "[heard_pi
 
 # Every key of presets that are in tune, and of one at 96 kHz.
 add_deep_test(tuner_48000 90 $<TARGET_FILE:ressort_voicing> --tuner 48000 Celesta Guitar Harp
-  Harpsichord Oud Piano SteelGuitar Vibraphone)
+  Harpsichord Oud Piano SteelGuitar Vibraphone CoupledStrings HandBell MarimbaTube
+  PluckedHarmonics Resonator SlidingFret SteelDrum)
 add_deep_test(tuner_96000 60 $<TARGET_FILE:ressort_voicing> --tuner 96000 Guitar)
 
 # Masses and bodies one per cent below and above the stability limit.
