@@ -174,7 +174,7 @@ TEST_CASE("each stop of a morph sounds as its preset does", "[morph]") {
   const Scene morph = scene_of_preset("BarMetals");
   const int index = index_of(morph.network, "metal");
   double stop = 0.0;
-  for (const char* name : {"Vibraphone", "Celesta", "Glockenspiel"}) {
+  for (const char* name : {"Vibraphone", "CelestaBar", "Glockenspiel"}) {
     Scene alone = scene_of_preset(name);
     stop += 1.0;
     // Struck alike at the same pitch.
