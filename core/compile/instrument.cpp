@@ -29,6 +29,15 @@ GestureSettings settings_of(const ControlSetting& setting) {
           .roughness = setting.noise};
 }
 
+// Returns whether an input pushes a mass that no spring brings back.
+bool is_thrown(const Network& network, const Input& input) {
+  return input.is_force && network.masses[input.mass].kind == MassKind::mass &&
+         std::none_of(network.links.begin(), network.links.end(), [&](const Link& link) {
+           return (link.a == input.mass || link.b == input.mass) &&
+                  linear_part(link).stiffness != no_argument;
+         });
+}
+
 // The setting must fit the network.
 Control make_control(const Network& network, const ControlSetting& setting) {
   static constexpr Source sources[] = {Source::note,   Source::controller, Source::pressure,
@@ -54,6 +63,8 @@ Control make_control(const Network& network, const ControlSetting& setting) {
   control.target = static_cast<std::uint16_t>(control.gesture == Gesture::parameter
                                                   ? find_parameter(network, setting.target)
                                                   : find_input(network, setting.target));
+  control.throws =
+      control.gesture == Gesture::impulse && is_thrown(network, network.inputs[control.target]);
   return control;
 }
 

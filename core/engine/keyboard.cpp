@@ -24,7 +24,8 @@ Keyboard::Keyboard(const Playing& playing, double rate_hz, std::size_t outputs)
       rate_hz_(rate_hz),
       restrikes_(std::none_of(playing.controls.begin(), playing.controls.end(),
                               [](const Control& control) {
-                                return control.source == Source::note && control.settings.has_level;
+                                return control.source == Source::note &&
+                                       (control.settings.has_level || control.throws);
                               })),
       rings_on_(std::none_of(playing.controls.begin(), playing.controls.end(),
                              [](const Control& control) {
@@ -169,7 +170,8 @@ Voice& Keyboard::voice_for(int key, std::uint8_t channel) {
 }
 
 // A repeated key strikes this voice again. A damped voice is left to ring out beside a new one, and
-// so is a voice whose level depends on how hard its key was pressed.
+// so is a voice whose level depends on how hard its key was pressed, and one whose hammer has flown
+// away: a second blow would add to its speed, and the hammer would come back too late and too fast.
 bool Keyboard::is_restruck(const Voice& voice, int key, std::uint8_t channel) const {
   return restrikes_ && voice.is_live() && voice.is_undamped() && voice.has_key &&
          voice.key == key && voice.channel == channel;

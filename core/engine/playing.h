@@ -32,6 +32,7 @@ struct Control {
   std::uint8_t turns = 1;  // number of controls in the round robin
   Gesture gesture = Gesture::position;
   std::uint16_t target = 0;  // index into Machine::inputs or Machine::parameters
+  bool throws = false;       // strikes a mass that no spring holds, such as a hammer
   GestureSettings settings;        // for a sound without a key, those of middle C
   std::vector<KeySettings> by_key;  // the settings at some keys, ascending; empty: on all keys alike
 

@@ -244,6 +244,35 @@ TEST_CASE("a repeated key damps the earlier voice of that key", "[dampers]") {
   CHECK(player.engine().meters().stepped == 1);
 }
 
+// A hammer rebounds and flies away. If the same voice were struck again, the blows would add up,
+// and the hammer would come back at several times its speed.
+TEST_CASE("a repeated key strikes with a new hammer", "[dampers]") {
+  const std::string hammered =
+      scenes::string("s", 10, "0.1", "0.0005") +
+      "@h mass 0.5 0. 0.\n@in1 frcInput @h\n@c contact @h @s_m2 0.1 0.001\n" +
+      scenes::output(1, "s_m6");
+  Player player(hammered, struck(2));
+  // A strike replaces the voice before it, whose damper has a T60 of 0.2 s: nothing is left of it
+  // after 0.68 s. The second strike and all after it have the same peak, at most that of two
+  // voices.
+  constexpr std::uint32_t apart = 30000;
+  constexpr std::uint32_t strikes = 6;
+  std::vector<Event> events;
+  for (std::uint32_t n = 0; n < strikes; ++n) {
+    events.push_back(note_on(n * apart, 60));
+  }
+  player.run(strikes * apart, events);
+  const auto first = std::span(player.y()).first(apart);
+  const auto second = std::span(player.y()).subspan(apart, apart);
+  REQUIRE(peak(first) > 1e-3);
+  CHECK(peak(second) < 2.0 * peak(first));
+  for (std::uint32_t n = 2; n < strikes; ++n) {
+    INFO(n);
+    CHECK(peak(std::span(player.y()).subspan(n * apart, apart)) ==
+          Approx(peak(second)).epsilon(1e-6));
+  }
+}
+
 // Networks are linear, so two strikes sound like the sum of both alone.
 TEST_CASE("a soft strike leaves a louder note ringing, with keys tuned or fixed", "[dampers]") {
   for (const bool is_tuned : {true, false}) {
