@@ -452,9 +452,10 @@ struct Engine::Player {
       // A quiet voice sleeps only if nothing moves anywhere: a slow wave may still be on its way to
       // the output.
       if (was_awake && voices.update(voice) && !gestures.is_any_moving(lane) &&
-          std::all_of(b.parts.begin(), b.parts.end(), [&](const PartBank<T>& part) {
-            return part.of(lane).is_near_start(lane % part.width, quiet_position);
-          })) {
+          (voices.may_sleep_moving(voice) ||
+           std::all_of(b.parts.begin(), b.parts.end(), [&](const PartBank<T>& part) {
+             return part.of(lane).is_near_start(lane % part.width, quiet_position);
+           }))) {
         voices.sleep(voice);
       }
       if (was_awake && !voice.awake) {

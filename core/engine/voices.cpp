@@ -27,6 +27,8 @@ bool is_stolen_before(const Voice& a, const Voice& b) {
 Voices::Voices(const Playing& playing, double rate_hz)
     : playing_(playing),
       rate_hz_(rate_hz),
+      throws_(std::any_of(playing.controls.begin(), playing.controls.end(),
+                          [](const Control& control) { return control.throws; })),
       level_kept_(std::exp(-static_cast<double>(max_block_frames) / (level_memory_s * rate_hz))),
       voices_(lane_count(playing.voices)) {}
 
@@ -206,11 +208,13 @@ bool Voices::update(Voice& voice) {
     return false;
   }
   voice.quiet_frames = peak < quiet_level ? voice.quiet_frames + max_block_frames : 0;
+  voice.quiet_spans = peak < quiet_level ? voice.quiet_spans : 0;
   if (playing_.bare || voice.held || voice.sustained ||
       static_cast<double>(voice.quiet_frames) < quiet_s * rate_hz_) {
     return false;
   }
   voice.quiet_frames = 0;
+  ++voice.quiet_spans;
   return true;
 }
 

@@ -78,6 +78,7 @@ struct alignas(64) Voice {
   double velocity = 0.0;          // velocity of its last strike, 0..1, after the preset's curve
   double level = 0.0;             // output peak with a slow release
   std::size_t quiet_frames = 0;
+  std::size_t quiet_spans = 0;  // of 0.5 s, since its last sound
   std::uint64_t turn = 0;     // serial number of its key press
   double frequency_hz = 0.0;  // without bend; 0: as the model is written
   double key_hz = 0.0;        // requested frequency, before the stability limit
@@ -176,6 +177,12 @@ class Voices {
   // Updates the level of an awake voice, and ends it when its fade is complete. Called once in
   // max_block_frames. Returns true if the voice has been quiet for so long that it may sleep.
   bool update(Voice& voice);
+  // Returns whether a voice has been quiet for so long that it may sleep although something moves:
+  // a hammer that has flown away never comes to rest.
+  bool may_sleep_moving(const Voice& voice) const {
+    constexpr std::size_t long_quiet_spans = 10;
+    return throws_ && voice.quiet_spans >= long_quiet_spans;
+  }
   // Frees the lane. A later wake() starts it at the same pitch.
   void sleep(Voice& voice);
 
@@ -188,6 +195,7 @@ class Voices {
 
   const Playing& playing_;
   double rate_hz_;
+  bool throws_;        // notes throw a mass, such as a hammer
   double level_kept_;  // share of the level kept from one update to the next
   std::vector<Voice> voices_;
   std::size_t awake_ = 0;

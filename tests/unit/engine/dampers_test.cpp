@@ -271,6 +271,10 @@ TEST_CASE("a repeated key strikes with a new hammer", "[dampers]") {
     CHECK(peak(std::span(player.y()).subspan(n * apart, apart)) ==
           Approx(peak(second)).epsilon(1e-6));
   }
+  // The hammers fly on, but each voice ends five seconds after its last sound.
+  CHECK(player.engine().meters().stepped > 0);
+  player.run(25 * 44100, {note_off(0, 60)});
+  CHECK(player.engine().meters().stepped == 0);
 }
 
 // Networks are linear, so two strikes sound like the sum of both alone.
