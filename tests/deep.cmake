@@ -92,7 +92,7 @@ add_deep_test(edits_more 300 ${CMAKE_COMMAND} -E env RESSORT_EDITS=1000
   $<TARGET_FILE:ressort_tests> "[reload]")
 
 # Every bow at every speed and pressure on 24 keys.
-add_deep_test(bows 60 $<TARGET_FILE:ressort_voicing> --bows 8 Violin Cello DoubleBass)
+add_deep_test(bows 120 $<TARGET_FILE:ressort_voicing> --bows 8 Violin Viola Cello DoubleBass)
 
 # A note at random settings of all controls of each preset. RESSORT_SETTINGS sets the number.
 add_deep_test(settings_more 600 sh -c
