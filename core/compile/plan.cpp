@@ -28,6 +28,19 @@ std::string rounded(double value) {
   return text;
 }
 
+// Returns whether all oscillators are modes of bodies, and all links passive. Every form samples
+// such a mode exactly at any stiffness (core/sampled_mode.h).
+bool has_free_modes(const Program& program) {
+  const auto is_free = [&](const MassRun& run) {
+    return !run.is_oscillator || program.coefficients[run.stiffness].mode != no_mode;
+  };
+  return !program.modes.empty() &&
+         std::all_of(program.mass_runs.begin(), program.mass_runs.end(), is_free) &&
+         std::all_of(program.link_runs.begin(), program.link_runs.end(), [](const LinkRun& run) {
+           return run.scheme == Scheme::discrete_gradient && !is_linear(run.law);
+         });
+}
+
 std::string describe(const Accuracy& accuracy) {
   if (!accuracy.is_known) {
     return "its error against the continuous network is unknown";
@@ -82,7 +95,7 @@ class Chooser {
   }
 
   // Chooses exact modes, which are stable at any stiffness, or enough steps a sample for the
-  // stiffest key; nothing if the part has neither.
+  // stiffest key, or any form of free modes; nothing if the part has none of these.
   std::optional<Part> reach(AccuracyMeter* meter, const Accuracy& spent) {
     spent_ = spent;
     meter_ = meter;
@@ -95,6 +108,9 @@ class Chooser {
     const std::uint32_t times = steps_to_reach();
     if (program_.modes.empty() && times <= most_steps_to_reach && !may_gain_) {
       add_steps(times, load_at_steps());
+    }
+    if (candidates_.empty() && has_free_modes(program_)) {
+      consider_identical();
     }
     // One voice must be affordable. The number of affordable voices is found while playing.
     if (candidates_.empty() ||
