@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "core/model/topology.h"
+#include "core/sampled_mode.h"
 
 namespace ressort::compile {
 namespace {
@@ -124,21 +125,45 @@ class ProgramMaker {
     }
   }
 
+  // Returns how often a formula reads parameters.
+  static std::ptrdiff_t reads_of(const Formula& formula) {
+    return std::count_if(formula.begin(), formula.end(),
+                         [](const Step& step) { return step.op == Op::parameter; });
+  }
+
+  // Returns whether a mode rings at a frequency that no parameter changes. Both M (w^2 + s^2) and
+  // 2 M s have the formulas of the mass M and of the decay rate s, but only the stiffness has w.
+  bool rings_at_one_frequency(const Mass& mass, const SampledCoefficients& mode) const {
+    const auto value = [&](std::uint32_t c) {
+      return continuous_value(program_, program_.coefficients[c], program_.parameters, 1.0);
+    };
+    const double rate = 0.5 * value(mode.inverse_mass) * value(mode.damping);
+    return reads_of(formula_of(mass.stiffness)) == reads_of(formula_of(mass.damping)) &&
+           value(mode.inverse_mass) * value(mode.stiffness) - rate * rate < highest_ring;
+  }
+
   // Adds a run for one mode of a body. Its three coefficients depend on the formulas of all three,
-  // because sampling a mode exactly mixes mass, stiffness and damping (core/sampled_mode.h).
+  // because sampling a mode exactly mixes mass, stiffness and damping (core/sampled_mode.h). Only
+  // the mass of a mode that rings at any T60 depends on itself alone.
   void add_mode(std::uint32_t node, const Mass& mass) {
     const auto mode = static_cast<std::uint32_t>(program_.modes.size());
     const auto add = [&](ArgumentId argument, Unit unit) {
       const std::uint32_t next = add_coefficient(argument, unit, mass.is_fixed);
       program_.coefficients[next].mode = mode;
-      for (const ArgumentId other : {mass.mass, mass.stiffness, mass.damping}) {
-        depend(next, formula_of(other));
-      }
       return next;
     };
     const SampledCoefficients coefficients{.inverse_mass = add(mass.mass, Unit::inverse_mass),
                                            .stiffness = add(mass.stiffness, Unit::stiffness),
                                            .damping = add(mass.damping, Unit::damping)};
+    const bool keeps_mass = rings_at_one_frequency(mass, coefficients);
+    for (const std::uint32_t next :
+         {coefficients.inverse_mass, coefficients.stiffness, coefficients.damping}) {
+      depend(next, formula_of(mass.mass));
+      if (next != coefficients.inverse_mass || !keeps_mass) {
+        depend(next, formula_of(mass.stiffness));
+        depend(next, formula_of(mass.damping));
+      }
+    }
     program_.modes.push_back(coefficients);
     program_.mass_runs.push_back({.first = node,
                                   .count = 1,
