@@ -63,6 +63,7 @@ void Coefficients<T>::finish(std::size_t frames) {
   if (ramp_frames == 0) {
     for (const std::uint32_t c : ramping) {
       is_ramping[c] = false;
+      std::fill_n(increment.begin() + static_cast<std::ptrdiff_t>(c * width), width, T(0));
     }
     ramping.clear();
   }

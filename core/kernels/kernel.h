@@ -46,8 +46,8 @@ class Coefficients {
 
   std::size_t width;
   Aligned<T> value;                    // [coefficient][lane]
-  Aligned<T> increment;                // [coefficient][lane] per sample, while ramping
-  Aligned<T> target;                   // [coefficient][lane] at the end of the ramp
+  Aligned<T> increment;                // [coefficient][lane] per sample; 0 if it does not ramp
+  Aligned<T> target;                   // [coefficient][lane] at the end of the ramp, or the value
   std::vector<std::uint32_t> ramping;  // coefficients that are ramping
   std::vector<bool> is_ramping;        // [coefficient]
   std::size_t ramp_frames = 0;         // samples until the ramps end

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "core/kernels/estimates.h"
@@ -74,6 +75,7 @@ class ModesFinder {
       return std::move(modes_);
     }
     drop_idle_modes();
+    find_felt();
     for (auto* frames : {&stiffness_, &damping_}) {
       for (const Frame& frame : *frames) {
         auto& shares = frames == &stiffness_ ? modes_.stiffness : modes_.damping;
@@ -146,6 +148,31 @@ class ModesFinder {
       return row;
     }
     return in_modes(body_.root * force);
+  }
+  // Collects the coefficients of links, pushes, forces and masses.
+  void find_felt() {
+    std::set<std::uint32_t> felt = {modes_.give_by};
+    if (modes_.inverse_mass != Modes::own_mass) {
+      felt.insert(modes_.inverse_mass);
+    }
+    for (const ModalPush& push : modes_.pushes) {
+      felt.insert({push.stiffness, push.damping});
+    }
+    for (const ModalHold& hold : modes_.holds) {
+      const auto& coefficients = program_.link_runs[hold.run].coefficients;
+      felt.insert(std::begin(coefficients), std::end(coefficients));
+    }
+    for (const ModalOutput& output : modes_.outputs) {
+      for (const ModalForce::Part& part : output.force.parts) {
+        felt.insert(part.coefficient);
+      }
+      for (const ModalForce::Hand& hand : output.force.hands) {
+        felt.insert({hand.stiffness, hand.damping});
+      }
+    }
+    felt.erase(felt.lower_bound(static_cast<std::uint32_t>(program_.coefficients.size())),
+               felt.end());
+    modes_.felt.assign(felt.begin(), felt.end());
   }
   // Returns a sum over masses for each mode.
   Vector in_modes(const Vector& masses) const {

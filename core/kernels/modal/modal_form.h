@@ -141,6 +141,7 @@ struct Modes {
   std::vector<ModalEnd> ends;      // numbered on from the places
   std::vector<ModalHold> holds;
   std::vector<ModalOutput> outputs;  // [output]
+  std::vector<std::uint32_t> felt;   // coefficients that act other than by a mode's share
 };
 
 // Limits of the masses that are connected, by the time for the eigenvectors, and of all modes, by

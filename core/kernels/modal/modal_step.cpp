@@ -167,12 +167,16 @@ struct ModalPlayer {
     s.passive.shoves_later = !Moving && may_shove_later();
     std::fill_n(s.passive.shove, s.held.places, T(0));
     bool acts = false;
+    constexpr bool moves_by_shares = Moving && !Crossed;
+    if (moves_by_shares && modes.is_exact) {
+      leap_shares(frames);
+    }
     for (std::size_t n = first; n < first + frames; ++n) {
       if constexpr (Moving) {
-        advance(s.ramps);
-        if (modes.is_exact && !Crossed) {
+        if (moves_by_shares && modes.is_exact) {
           advance_exact();
         } else {
+          advance(s.ramps);
           mix(0, s.motion.k, s.motion.z);
         }
         mix_forces();
@@ -823,14 +827,12 @@ struct ModalPlayer {
 
   // Returns a coefficient some samples ahead.
   T coefficient(std::uint32_t c, std::size_t ahead) const {
-    for (std::size_t i = 0; ahead > 0 && i < s.ramps.count; ++i) {
-      if (s.ramps.ramping[i] == c) {
-        return ahead < s.ramps.frames
-                   ? s.ramps.value[c] + static_cast<T>(ahead) * s.ramps.increment[c]
-                   : s.ramps.target[c];
-      }
+    if (ahead == 0) {
+      return s.ramps.value[c];
     }
-    return coefficient(c);
+    return ahead < s.ramps.frames
+               ? s.ramps.value[c] + static_cast<T>(ahead) * s.ramps.increment[c]
+               : s.ramps.target[c];
   }
 
   // Computes lK and lZ some samples ahead.
@@ -916,7 +918,25 @@ struct ModalPlayer {
     }
     return frames;
   }
+  // Moves the coefficients that only give shares of k and z, to the end of a part: advance_exact()
+  // moves k and z instead.
+  void leap_shares(std::size_t frames) {
+    for (std::size_t i = 0; i < s.ramps.count; ++i) {
+      const std::uint32_t c = s.ramps.ramping[i];
+      bool is_felt = false;
+      for (const std::uint32_t felt : modes.felt) {
+        is_felt |= felt == c;
+      }
+      s.ramps.value[c] = is_felt ? s.ramps.value[c] : coefficient(c, frames);
+    }
+  }
   void advance_exact() {
+    if (s.ramps.frames > 0) {
+      const bool arrives = --s.ramps.frames == 0;
+      for (const std::uint32_t c : modes.felt) {
+        s.ramps.value[c] = arrives ? s.ramps.target[c] : s.ramps.value[c] + s.ramps.increment[c];
+      }
+    }
     for (std::size_t i = 0; i < all_packs(s); ++i) {
       packs(s.motion.k)[i] += packs(s.motion.k_step)[i];
       packs(s.motion.z)[i] += packs(s.motion.z_step)[i];
