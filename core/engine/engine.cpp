@@ -37,6 +37,7 @@ Playing completed(Playing playing, const Machine& machine) {
 // Controller numbers of MIDI 1.0 that the player handles itself.
 constexpr int all_sound_off = 120;
 constexpr int reset_all_controllers = 121;
+constexpr int sustain_pedal = 64;
 constexpr int all_notes_off = 123;  // implied by the channel modes from here on
 constexpr int mono_on = 126;
 constexpr int poly_on = 127;
@@ -136,10 +137,7 @@ struct Engine::Player {
       case EventKind::strike:
         return std::visit([&](auto& b) { strike(b, event); }, bank);
       case EventKind::panic:
-        share.restart();
-        variation.drop(all_channels);
-        mute_body();
-        return keyboard.panic();
+        return panic();
     }
   }
 
@@ -226,6 +224,31 @@ struct Engine::Player {
     release_voices([&](Voice& voice) { return keyboard.is_released_by_pedal(voice, channel); });
   }
 
+  // Resets a channel. The preset's controls learn that the sustain pedal is up.
+  void reset_controllers(std::uint8_t channel) {
+    const bool was_down = keyboard.channels().damper(channel) < 1.0;
+    keyboard.reset_controllers(channel);
+    release_by_pedal(channel);
+    if (was_down) {
+      play_controls(Source::controller, sustain_pedal, 0.0, {.channels = reached_by(channel)});
+    }
+  }
+
+  // Silences everything and lifts all pedals, for the preset's controls too.
+  void panic() {
+    share.restart();
+    variation.drop(all_channels);
+    mute_body();
+    bool was_down = false;
+    for (std::uint8_t channel = 0; channel < Channels::count; ++channel) {
+      was_down |= keyboard.channels().damper(channel) < 1.0;
+    }
+    keyboard.panic();
+    if (was_down) {
+      play_controls(Source::controller, sustain_pedal, 0.0, {.channels = all_channels});
+    }
+  }
+
   void release_all(ChannelMask channels) {
     keyboard.forget_keys(channels);
     release_voices([&](Voice& voice) {
@@ -271,8 +294,7 @@ struct Engine::Player {
         mute_body();  // no other channel plays it
       }
     } else if (event.index == reset_all_controllers) {
-      keyboard.reset_controllers(channel);
-      release_by_pedal(channel);
+      reset_controllers(channel);
     } else if (event.index >= all_notes_off) {
       release_all(reached);
       if (event.index == mono_on || event.index == poly_on) {
@@ -286,8 +308,7 @@ struct Engine::Player {
       release_all(rezoned);
       for (std::uint8_t other = 0; other < Channels::count; ++other) {
         if (has_channel(rezoned, other)) {
-          keyboard.reset_controllers(other);
-          release_by_pedal(other);
+          reset_controllers(other);
         }
       }
     }

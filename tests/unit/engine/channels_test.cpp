@@ -288,6 +288,33 @@ TEST_CASE("RPN 5 sets the depth of the modulation wheel", "[channels]") {
   CHECK(played(reset, {wheel(1.0)}) == half);
 }
 
+TEST_CASE("a reset and a panic lift the sustain pedal for the preset's controls", "[channels]") {
+  const std::string text = scenes::string("s", 10, "0.1", "0.0005") + "@in1 frcInput @s_m2\n" +
+                           scenes::output(1, "s_m6");
+  Preset preset = struck(4);
+  preset.parameters.push_back({.name = "s_K", .value = 0.1, .minimum = 0.1, .maximum = 0.2});
+  preset.controls.push_back({.source = ControlSource::controller,
+                             .number = 64,
+                             .target = "s_K",
+                             .gesture = Gesture::parameter,
+                             .low = 0.1,
+                             .high = 0.2});
+  const auto played = [&](std::vector<Event> events) {
+    events.push_back(note_on(0, 60));
+    Player player(text, preset);
+    player.run(8000, events);
+    CHECK(player.heap_calls == 0);
+    return player.y();
+  };
+  const std::vector<double> up = played({});
+  REQUIRE(apart(up, played({turned(0, 0, 64, 127)})) > 1e-3);
+  CHECK(played({turned(0, 0, 64, 127), turned(0, 0, 121, 0)}) == up);
+  CHECK(played({turned(3, 0, 64, 127), {.kind = EventKind::panic}}) == up);
+  // A pedal that is up moves nothing: the parameter keeps what another source has set.
+  const std::vector<double> set = played({parameter(0, 0, 0.2)});
+  CHECK(played({parameter(0, 0, 0.2), turned(0, 0, 121, 0)}) == set);
+}
+
 TEST_CASE("the soft pedal softens notes that are struck while it is down", "[channels]") {
   const std::vector<double> plain = heard({note_on(0, 60)});
   const std::vector<double> soft = heard({turned(0, 0, 67, 127), note_on(0, 60)});
