@@ -6,7 +6,8 @@ set(ressort_fuzzers model preset score midi smf scala console osc osc_packet fli
 list(TRANSFORM ressort_fuzzers PREPEND fuzz_ OUTPUT_VARIABLE ressort_deep_tests)
 list(APPEND ressort_deep_tests arm everything_sanitized everything_more forms_everywhere
   accuracy_everywhere silence_everywhere modes_everywhere calculix_everywhere bodies_everywhere
-  bells_everywhere heard_pitch_everywhere tuner_48000 tuner_96000 thorough bench lint scenes_more abuse_long callback_minute bows settings_more edits_more
+  bells_everywhere heard_pitch_everywhere tuner_44100
+  tuner_48000 tuner_96000 thorough bench lint scenes_more abuse_long callback_minute bows settings_more edits_more
   flights_everywhere server_killed installed soak races)
 list(LENGTH ressort_deep_tests ressort_deep_count)
 
@@ -42,11 +43,17 @@ add_deep_test(scenes_more 200 ${CMAKE_COMMAND} -E env RESSORT_SCENES=1001,2000,1
 # The pitch of every tuned preset, measured on the sound over the keyboard at three rates.
 add_deep_test(heard_pitch_everywhere 120 $<TARGET_FILE:ressort_tests> "[heard_pitch_everywhere]")
 
-# Every key of presets that are in tune, and of one at 96 kHz.
-add_deep_test(tuner_48000 90 $<TARGET_FILE:ressort_voicing> --tuner 48000 Celesta Guitar Harp
-  Harpsichord Oud Piano SteelGuitar Vibraphone CoupledStrings HandBell MarimbaTube
-  PluckedHarmonics Resonator SlidingFret SteelDrum)
-add_deep_test(tuner_96000 60 $<TARGET_FILE:ressort_voicing> --tuner 96000 Guitar)
+# Every key of all melodic presets.
+set(ressort_tuned BarMetals BassGuitar BellThirds Bourdon BowedString BrokenString Celesta CelestaBar
+  Cello ChurchBell CoupledStrings DoubleBass Dulcimer ElectricGuitar GlassHarmonica Glockenspiel
+  Guitar HandBell Harp Harpsichord IPlayTheTriangle MajorBell Marimba MarimbaTube MutedBass
+  NylonGuitar Oud Piano PluckedHarmonics PolyTriangle Resonator Sitar SixStructures SlidingFret
+  SteelDrum SteelGuitar TibetanBowl Vibraphone Viola Violin)
+foreach(rate IN ITEMS 44100 48000 96000)
+  math(EXPR seconds "${rate} / 100")
+  add_deep_test(tuner_${rate} ${seconds} $<TARGET_FILE:ressort_voicing> --tuner ${rate}
+    ${ressort_tuned})
+endforeach()
 
 # Masses and bodies one per cent below and above the stability limit.
 add_deep_test(bodies_everywhere 60 $<TARGET_FILE:ressort_tests> "[bodies_everywhere]")

@@ -11,9 +11,6 @@ namespace {
 
 constexpr int lowest_key = 21;
 constexpr int highest_key = 108;
-// A bow's slip starts at a sample. From here on it locks on whole samples per period, which is up to
-// 20 cents off at 44.1 kHz.
-constexpr int highest_bowed_key = 95;
 constexpr double most_step_cents = 5.0;
 constexpr double most_partials_cents = 3.0;
 // A reading starts when a bow has caught the string and a curved bridge has let it go, or earlier
@@ -25,7 +22,8 @@ constexpr double silence_db = -60.0;
 
 struct Reading {
   int key = 0;
-  double yin_cents = 0.0;  // relative to the key
+  double whole_cents = 0.0;      // YIN of the sound, relative to the key
+  double strongest_cents = 0.0;  // YIN of the strongest partial alone
   PartialsPitch partials;
   double step_cents = 0.0;  // deviation from a semitone above the last key
   bool is_off() const {
@@ -50,14 +48,22 @@ std::optional<Reading> read(Player& player, int key) {
   const double to_s = from_s + (is_short ? std::max(0.4, 24.0 / hz) : seconds);
   const Stereo sound = all.part(from_s, to_s);
   const PartialsPitch partials = partials_pitch(sound, hz);
-  // YIN weights partial n by n^2, so that a stiff string or a bar misleads it. It measures the
-  // strongest partial alone. The neighbours are 5 standard deviations away.
+  // In a band around the strongest partial, the neighbours are 5 standard deviations away.
   const int n = partials.strongest;
   const Stereo band = band_around(all, n * hz, 0.2 / n).part(from_s, to_s);
   return Reading{.key = key,
-                 .yin_cents = cents(yin_hz(band, n * hz / 1.5, n * hz * 1.5), n * hz) -
-                              stretch_cents(n, partials.stiffness),
+                 .whole_cents = cents(yin_hz(sound, hz / 1.5, hz * 1.5), hz),
+                 .strongest_cents = cents(yin_hz(band, n * hz / 1.5, n * hz * 1.5), n * hz) -
+                                    stretch_cents(n, partials.stiffness),
                  .partials = partials};
+}
+
+// YIN of a whole sound weights partial n by n^2, so that a stiff string or a bar misleads it. The
+// single partials of a sitar exchange energy and drift. A mistuned key moves both readings.
+double smaller_step(const Reading& from, const Reading& to) {
+  const double whole = to.whole_cents - from.whole_cents;
+  const double strongest = to.strongest_cents - from.strongest_cents;
+  return std::fabs(whole) < std::fabs(strongest) ? whole : strongest;
 }
 
 }  // namespace
@@ -71,26 +77,24 @@ int check_semitones(Player& player, const std::string& name) {
   double worst_step = 0.0;
   double worst_partials = 0.0;
   std::optional<Reading> last;
-  const std::vector<ControlSetting>& controls = player.scene().preset.controls;
-  const bool is_bowed = std::any_of(controls.begin(), controls.end(), [](const auto& control) {
-    return control.gesture == Gesture::bow;
-  });
-  for (int key = lowest_key; key <= (is_bowed ? highest_bowed_key : highest_key); ++key) {
+  for (int key = lowest_key; key <= highest_key; ++key) {
     std::optional<Reading> reading = read(player, key);
     if (!reading) {
       continue;
     }
     if (last) {
-      reading->step_cents = reading->yin_cents - last->yin_cents;
+      reading->step_cents = smaller_step(*last, *reading);
     }
     ++keys;
     worst_step = std::max(worst_step, std::fabs(reading->step_cents));
     worst_partials = std::max(worst_partials, std::fabs(reading->partials.cents));
     if (reading->is_off()) {
       ++off;
-      std::printf("  %s key %d: YIN %+.1f cents, step %+.1f, partials %+.1f (B %.1e)\n",
-                  name.c_str(), key, reading->yin_cents, reading->step_cents,
-                  reading->partials.cents, reading->partials.stiffness);
+      std::printf("  %s key %d: YIN %+.1f cents, of partial %d %+.1f, step %+.1f, partials %+.1f "
+                  "(B %.1e)\n",
+                  name.c_str(), key, reading->whole_cents, reading->partials.strongest,
+                  reading->strongest_cents, reading->step_cents, reading->partials.cents,
+                  reading->partials.stiffness);
     }
     last = reading;
   }
