@@ -52,6 +52,10 @@ struct VoiceCurve {
            : is_by_ratios() ? limited(value * value_at(velocity, velocity_of_note))
                             : limited(value + value_at(velocity, velocity_of_note));
   }
+  // LFOs move a value by factors or offsets, too.
+  double neutral() const { return is_by_ratios() ? 1.0 : 0.0; }
+  double joined(double a, double b) const { return is_by_ratios() ? a * b : a + b; }
+  double moved(double value, double by) const { return limited(joined(value, by)); }
 
  private:
   double unlimited(double key, double knob) const {

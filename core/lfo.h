@@ -10,7 +10,7 @@
 
 namespace ressort {
 
-enum class LfoShape : std::uint8_t { sine, triangle, random };
+enum class LfoShape : std::uint8_t { sine, triangle, random, steps };
 
 struct Lfo {
   double rate_hz = 5.0;
@@ -32,10 +32,10 @@ class LfoState {
   }
   void advance(double seconds) { age_s_ += seconds; }
   // Returns a value in -depth..depth. The random shape joins random points by straight lines, one
-  // point per period.
+  // point per period. The steps keep a random value for a period, from the start.
   double value(const Lfo& lfo) {
     const double t = age_s_ - lfo.delay_s;
-    if (t <= 0.0) {
+    if (t < 0.0 || (t == 0.0 && lfo.shape != LfoShape::steps)) {
       return 0.0;
     }
     const double turns = t * rate_hz_;
@@ -47,12 +47,13 @@ class LfoState {
       case LfoShape::triangle:
         return depth * (std::fabs(std::fabs(4.0 * part - 1.0) - 2.0) - 1.0);
       case LfoShape::random:
+      case LfoShape::steps:
         if (turns >= next_point_) {
           next_point_ = std::floor(turns) + 1.0;
           from_ = to_;
           to_ = random_.next();
         }
-        return depth * (from_ + (to_ - from_) * part);
+        return depth * (lfo.shape == LfoShape::steps ? to_ : from_ + (to_ - from_) * part);
     }
     return 0.0;
   }

@@ -54,7 +54,11 @@ Control make_control(const Network& network, const ControlSetting& setting) {
   control.turns = static_cast<std::uint8_t>(setting.turns);
   control.settings = settings_of(setting);
   if (control.source == Source::lfo) {
-    control.target = setting.target == "pitch" ? Control::pitch : Control::level;
+    control.target = setting.target == "pitch"   ? Control::pitch
+                     : setting.target == "level" ? Control::level
+                                                 : static_cast<std::uint16_t>(
+                                                       Control::first_parameter +
+                                                       find_parameter(network, setting.target));
     return control;
   }
   for (const double key : curve_keys(setting)) {
@@ -266,8 +270,8 @@ KeyFrequencies key_frequencies(const Preset& preset) {
 std::vector<std::optional<VoiceCurve>> voice_curves(const Network& network, const Preset& preset,
                                                     const StabilityCheck& stability) {
   std::vector<std::optional<VoiceCurve>> curves;
-  for (const ParameterSetting& setting : preset.parameters) {
-    const int found = setting.has_curve() ? find_parameter(network, setting.name) : -1;
+  const auto add = [&](const ParameterSetting& setting) {
+    const int found = find_parameter(network, setting.name);
     if (found >= 0) {
       const auto index = static_cast<std::size_t>(found);
       const ParameterInfo& info = stability.parameters[index];
@@ -277,6 +281,16 @@ std::vector<std::optional<VoiceCurve>> voice_curves(const Network& network, cons
                        .keys_at = setting.keys_at.value_or(setting.value),
                        .lowest = info.minimum,
                        .highest = info.maximum};
+    }
+  };
+  for (const ControlSetting& control : preset.controls) {
+    if (control.source == ControlSource::lfo) {
+      add({.name = control.target});
+    }
+  }
+  for (const ParameterSetting& setting : preset.parameters) {
+    if (setting.has_curve()) {
+      add(setting);
     }
   }
   return curves;

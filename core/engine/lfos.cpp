@@ -13,7 +13,8 @@ Lfos::Lfos(const Playing& playing, double rate_hz)
       count_(playing.lfos.size()),
       states_(lane_count(playing.voices) * count_),
       scales_(states_.size(), 1.0),
-      channel_scales_(Channels::count * count_) {
+      channel_scales_(Channels::count * count_),
+      swings_(playing.swings_parameters() ? playing.curves.size() : 0) {
   for (std::size_t i = 0; i < channel_scales_.size(); ++i) {
     channel_scales_[i] = playing.lfos[i % count_].is_scaled ? 0.0 : 1.0;
   }
@@ -73,6 +74,10 @@ void Lfos::advance(Keyboard& keyboard) {
 void Lfos::apply(std::size_t lane, Keyboard& keyboard) {
   double semitones = 0.0;
   double db = 0.0;
+  for (std::size_t i = 0; i < swings_.size(); ++i) {
+    const VoiceCurve* const curve = playing_.curve_of(i);
+    swings_[i] = curve != nullptr ? curve->neutral() : 0.0;
+  }
   for (const Control& control : playing_.controls) {
     if (control.source == Source::lfo) {
       const std::size_t i = lane * count_ + control.number;
@@ -80,11 +85,18 @@ void Lfos::apply(std::size_t lane, Keyboard& keyboard) {
       const GestureSettings& range = control.settings;
       const double wanted = range.low + (range.high - range.low) * (0.5 + 0.5 * value);
       constexpr double cents = 0.01;
-      (control.target == Control::pitch ? semitones : db) +=
-          control.target == Control::pitch ? cents * wanted : wanted;
+      if (control.target == Control::pitch) {
+        semitones += cents * wanted;
+      } else if (control.target == Control::level) {
+        db += wanted;
+      } else {
+        const std::size_t parameter = control.target - Control::first_parameter;
+        swings_[parameter] = playing_.curves[parameter]->joined(swings_[parameter], wanted);
+      }
     }
   }
   keyboard.vibrate(keyboard.voices[lane], semitones, std::pow(10.0, db / 20.0));
+  keyboard.voices.swing(lane, swings_);
 }
 
 }  // namespace ressort::engine

@@ -1,4 +1,4 @@
-// core/engine: the LFOs of all voices. They bend and swell each note by itself.
+// core/engine: the LFOs of all voices. They move pitch, level and parameters of each note by itself.
 #pragma once
 
 #include <cstddef>
@@ -35,6 +35,7 @@ class Lfos {
   std::vector<LfoState> states_;        // [lane][lfo]
   std::vector<double> scales_;          // [lane][lfo] factor on the depth
   std::vector<double> channel_scales_;  // [channel][lfo] the factor for new notes
+  std::vector<double> swings_;          // [parameter] factors or offsets in one voice
 };
 
 }  // namespace ressort::engine

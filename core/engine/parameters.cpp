@@ -97,8 +97,12 @@ void Parameters::update_voice_values(const Voices& voices) {
   for (std::size_t lane = 0; !voice_values_.empty() && lane < voices.size(); ++lane) {
     const Voice& voice = voices[lane];
     const bool may_differ = has_changed() || voice.is_new || voice.is_retuned;
+    const std::span<const double> swings = voices.swings_in(lane);
     for (std::size_t i = 0; voice.awake && may_differ && i < values_.size(); ++i) {
-      voice_values_[lane * values_.size() + i] = value_in_voice(playing_, i, values_[i], voice);
+      const VoiceCurve* const curve = playing_.curve_of(i);
+      const double value = value_in_voice(playing_, i, values_[i], voice);
+      const bool is_swung = voice.has_key && curve != nullptr && !swings.empty();
+      voice_values_[lane * values_.size() + i] = is_swung ? curve->moved(value, swings[i]) : value;
     }
   }
 }

@@ -25,6 +25,7 @@ struct Control {
   Source source = Source::note;
   static constexpr std::uint16_t pitch = 0;  // targets of an LFO
   static constexpr std::uint16_t level = 1;
+  static constexpr std::uint16_t first_parameter = 2;
   std::uint16_t number = 0;  // controller 0..127, audio channel from 0, or index of the LFO
   std::uint8_t lowest_key = 0;
   std::uint8_t highest_key = 127;
@@ -135,6 +136,12 @@ struct Playing {
   // Returns the curve of a parameter; null if all voices share its value.
   const VoiceCurve* curve_of(std::size_t parameter) const {
     return parameter < curves.size() && curves[parameter] ? &*curves[parameter] : nullptr;
+  }
+  // Returns whether an LFO moves a parameter.
+  bool swings_parameters() const {
+    return std::any_of(controls.begin(), controls.end(), [](const Control& control) {
+      return control.source == Source::lfo && control.target >= Control::first_parameter;
+    });
   }
   // Returns the level that is heard per unit of position.
   double heard_gain() const { return gain * body_gain; }

@@ -30,16 +30,28 @@ Voices::Voices(const Playing& playing, double rate_hz)
       throws_(std::any_of(playing.controls.begin(), playing.controls.end(),
                           [](const Control& control) { return control.throws; })),
       level_kept_(std::exp(-static_cast<double>(max_block_frames) / (level_memory_s * rate_hz))),
-      voices_(lane_count(playing.voices)) {}
+      voices_(lane_count(playing.voices)),
+      swings_(playing.swings_parameters() ? voices_.size() * playing.curves.size() : 0) {}
 
 void Voices::continue_from(const Voices& from) {
   voices_ = from.voices_;
+  if (swings_.size() == from.swings_.size()) {
+    swings_ = from.swings_;
+  }
   awake_ = from.awake_;
   latest_ = from.latest_;
   limit_ = from.limit_;
   resets_ = from.resets_;
   stolen_ = from.stolen_;
   shed_ = from.shed_;
+}
+
+void Voices::swing(std::size_t lane, std::span<const double> amounts) {
+  const auto own = swings_.begin() + static_cast<std::ptrdiff_t>(lane * amounts.size());
+  if (!std::equal(amounts.begin(), amounts.end(), own)) {
+    std::copy(amounts.begin(), amounts.end(), own);
+    mark_retuned(voices_[lane]);
+  }
 }
 
 bool Voices::is_any_held() const {

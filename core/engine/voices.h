@@ -166,6 +166,13 @@ class Voices {
     voice.is_retuned = true;
     has_changed_ = true;
   }
+  // Sets the factors or offsets of a voice's parameters by LFOs, [parameter] (core/curve.h). The
+  // number of them is that of swings_in(), which is 0 if no LFO moves a parameter.
+  void swing(std::size_t lane, std::span<const double> amounts);
+  std::span<const double> swings_in(std::size_t lane) const {
+    const std::size_t count = swings_.size() / voices_.size();
+    return std::span(swings_).subspan(lane * count, count);
+  }
   // Some voice is new or retuned, and the kernels do not know it yet.
   bool has_changed() const { return has_changed_; }
   void clear_changes();
@@ -198,6 +205,7 @@ class Voices {
   bool throws_;        // notes throw a mass, such as a hammer
   double level_kept_;  // share of the level kept from one update to the next
   std::vector<Voice> voices_;
+  std::vector<double> swings_;  // [lane][parameter]
   std::size_t awake_ = 0;
   std::size_t latest_ = 0;
   bool has_changed_ = false;

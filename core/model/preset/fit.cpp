@@ -19,10 +19,46 @@ std::string names(const Network& network) {
   return text.empty() ? "none" : text;
 }
 
+// Returns the reason why a parameter cannot differ from voice to voice, or "". `what`: what needs
+// that.
+std::string misfit_in_voices(const Network& network, const Preset& preset, const std::string& name,
+                             const std::string& what) {
+  const int index = find_parameter(network, name);
+  if (index < 0) {
+    return no_parameter(network, name);
+  }
+  if (network.parameters[static_cast<std::size_t>(index)].audio_input > 0) {
+    return quoted(name) + " is set by an audio input, so it has no " + what +
+           "; remove one of them";
+  }
+  for (const BodyModel& body : preset.bodies) {
+    if (find_parameter(body.network, name) >= 0) {
+      return quoted(name) + " is a parameter of " + quoted(body.name()) +
+             " in 'through', which all voices share, so it has no " + what +
+             "; rename one of them";
+    }
+  }
+  const auto is_read = [&](const Step& step) {
+    return step.op == Op::parameter && step.index == static_cast<std::uint32_t>(index);
+  };
+  for (const Output& output : network.outputs) {
+    const Formula level =
+        output.level == no_argument ? Formula() : network.arguments[output.level];
+    if (std::any_of(level.begin(), level.end(), is_read)) {
+      return quoted(name) +
+             " sets the level of an output, which all voices share, so it has no " + what +
+             "; use 'keys_db' for a level by key";
+    }
+  }
+  return "";
+}
+
 // Returns an error message for the control, or "".
-std::string misfit(const Network& network, const ControlSetting& control) {
+std::string misfit(const Network& network, const Preset& preset, const ControlSetting& control) {
   if (control.source == ControlSource::lfo) {
-    return "";  // it moves the pitch or the level of every model
+    return control.target == "pitch" || control.target == "level"
+               ? ""
+               : misfit_in_voices(network, preset, control.target, "LFO");
   }
   if (control.gesture == Gesture::parameter) {
     return find_parameter(network, control.target) < 0 ? no_parameter(network, control.target)
@@ -44,39 +80,11 @@ std::string misfit(const Network& network, const ControlSetting& control) {
              : "";
 }
 
-// Returns an error message for the curves of a parameter, or "".
-std::string misfit(const Network& network, const Preset& preset,
-                   const ParameterSetting& setting) {
-  const int index = find_parameter(network, setting.name);
-  if (index < 0) {
-    return no_parameter(network, setting.name);
-  }
-  if (!setting.has_curve()) {
-    return "";
-  }
-  if (network.parameters[static_cast<std::size_t>(index)].audio_input > 0) {
-    return quoted(setting.name) + " is set by an audio input, so it has no curve; remove one of them";
-  }
-  for (const BodyModel& body : preset.bodies) {
-    if (find_parameter(body.network, setting.name) >= 0) {
-      return quoted(setting.name) + " is a parameter of " +
-             quoted(body.name()) +
-             " in 'through', which all voices share, so it has no curve; rename one of them";
-    }
-  }
-  const auto is_read = [&](const Step& step) {
-    return step.op == Op::parameter && step.index == static_cast<std::uint32_t>(index);
-  };
-  for (const Output& output : network.outputs) {
-    const Formula level =
-        output.level == no_argument ? Formula() : network.arguments[output.level];
-    if (std::any_of(level.begin(), level.end(), is_read)) {
-      return quoted(setting.name) +
-             " sets the level of an output, which all voices share, so it has no curve; use "
-             "'keys_db' for a level by key";
-    }
-  }
-  return "";
+// Returns an error message for the setting of a parameter, or "".
+std::string misfit(const Network& network, const Preset& preset, const ParameterSetting& setting) {
+  return setting.has_curve() ? misfit_in_voices(network, preset, setting.name, "curve")
+         : find_parameter(network, setting.name) < 0 ? no_parameter(network, setting.name)
+                                                     : "";
 }
 
 // Returns whether an input or a parameter of the network uses this audio channel.
@@ -237,7 +245,7 @@ std::vector<Error> find_preset_errors(const Network& network, const Preset& pres
                      preset.tuned_along_location.line, preset.tuned_along_location.column});
   }
   for (const ControlSetting& control : preset.controls) {
-    if (std::string message = misfit(network, control); !message.empty()) {
+    if (std::string message = misfit(network, preset, control); !message.empty()) {
       found.push_back({std::move(message), control.location.line, control.location.column});
     }
   }

@@ -421,9 +421,10 @@ void read_lfo(const toml::table& table, Preset& preset, std::vector<Error>& erro
   if (std::string shape; reader.text("shape", shape)) {
     lfo.shape = shape == "triangle" ? LfoShape::triangle
                 : shape == "random" ? LfoShape::random
+                : shape == "steps"  ? LfoShape::steps
                                     : LfoShape::sine;
     if (lfo.shape == LfoShape::sine && shape != "sine") {
-      reader.fail(*table.get("shape"), "'shape' must be sine, triangle or random");
+      reader.fail(*table.get("shape"), "'shape' must be sine, triangle, random or steps");
     }
   }
   if (std::string by; reader.text("by", by)) {
@@ -441,13 +442,15 @@ void read_lfo(const toml::table& table, Preset& preset, std::vector<Error>& erro
 
 // Checks the control of an LFO, which has no gesture.
 void check_lfo_control(const toml::table& table, const ControlSetting& control, TomlTable& reader) {
-  if (control.target != "pitch" && control.target != "level") {
+  if (control.gesture != Gesture::parameter) {
     reader.fail(table,
-                "an LFO moves \"pitch\" (in cents) or \"level\" (in dB); set 'to' to one of "
-                "them");
+                "an LFO moves \"pitch\" (in cents), \"level\" (in dB) or a parameter; set 'to' to one "
+                "of them");
   }
   if (table.get("range") == nullptr) {
-    reader.fail(table, "the control of an LFO needs 'range': cents or dB, range = [-10, 10]");
+    reader.fail(table,
+                "the control of an LFO needs 'range': cents, dB, or factors of a parameter, range = "
+                "[-10, 10]");
   }
   for (const auto& [key, node] : table) {
     if (key.str() != "from" && key.str() != "to" && key.str() != "range") {
@@ -573,8 +576,7 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
   if ((reader.text("to", control.target) || table.get("to") == nullptr) && control.target.empty()) {
     reader.fail(table, "a control needs 'to': an input such as \"in1\" or a parameter");
   }
-  control.gesture =
-      control.source == ControlSource::lfo ? Gesture::parameter : usual_gesture(control.target);
+  control.gesture = usual_gesture(control.target);
   if (std::string how; reader.text("how", how)) {
     const auto* row = std::find_if(
         std::begin(gestures), std::end(gestures),

@@ -80,8 +80,8 @@ std::vector<Reading> levels_of(std::span<const double> y) {
 }
 
 std::vector<double> heard(const Preset& preset, const std::vector<Event>& events,
-                          std::size_t frames = 4 * 44100) {
-  Player player(tone, preset);
+                          std::size_t frames = 4 * 44100, const std::string& model = tone) {
+  Player player(model, preset);
   player.run(frames, events);
   CHECK(player.heap_calls == 0);
   return player.y();
@@ -144,6 +144,55 @@ TEST_CASE("the wheel scales the depth of a vibrato, and each note has a vibrato 
     most = std::max(most, std::fabs(late[n] - expected));
   }
   CHECK(most < 1e-9 * peak(low));
+}
+
+// The same mode with its stiffness as a parameter, whose square root is the pitch.
+const std::string stiff =
+    "@K param 0.004\n@g ground 0.\n@m mass 1. 0. 0.\n@k springDamper @g @m K 0.000002\n"
+    "@in1 frcInput @m\n@out1 posOutput @m\n";
+
+TEST_CASE("an LFO moves a parameter in each voice by a factor within its range", "[lfo]") {
+  const LfoSetting lfo{.name = "v", .lfo = {.rate_hz = 5.0, .delay_s = 0.5}};
+  Preset preset = moved(lfo, "K", 0.9, 1.1);
+  preset.parameters.push_back({.name = "K", .value = 0.004, .minimum = 0.001, .maximum = 0.008});
+  auto cents = cents_of(heard(preset, one_note, 4 * 44100, stiff));
+  CHECK(std::fabs(greatest(cents, 0.0, 0.45)) < 0.5);
+  CHECK(greatest(cents, 0.6, 4.0) == Approx(600.0 * std::log2(1.1)).epsilon(0.05));
+  CHECK(rate_of(cents, 0.6) == Approx(5.0).epsilon(0.01));
+  for (Reading& reading : cents) {
+    reading.value = -reading.value;
+  }
+  CHECK(greatest(cents, 0.6, 4.0) == Approx(-600.0 * std::log2(0.9)).epsilon(0.05));
+  // The value stays within the parameter's range.
+  preset.parameters[0].maximum = 0.0042;
+  cents = cents_of(heard(preset, one_note, 4 * 44100, stiff));
+  CHECK(greatest(cents, 0.6, 4.0) == Approx(600.0 * std::log2(1.05)).epsilon(0.05));
+}
+
+TEST_CASE("slow random steps give each note a value of its own, from its start", "[lfo]") {
+  const LfoSetting lfo{.name = "v", .lfo = {.rate_hz = 0.01, .shape = LfoShape::steps}};
+  Preset preset = moved(lfo, "K", 0.9, 1.1);
+  preset.parameters.push_back({.name = "K", .value = 0.004, .minimum = 0.001, .maximum = 0.008});
+  std::vector<double> notes;
+  for (int before = 0; before < 8; ++before) {
+    std::vector<Event> events;
+    for (int i = 0; i < before; ++i) {  // silent notes, which have numbers
+      events.push_back(note_on(0, 60, 1e-12));
+      events.push_back(note_off(0, 60));
+    }
+    events.push_back(note_on(0, 69));
+    const auto cents = cents_of(heard(preset, events, 22050, stiff));
+    REQUIRE(!cents.empty());
+    notes.push_back(cents.back().value);
+    CHECK(cents.front().value == Approx(notes.back()).margin(0.1));
+    CHECK(notes.back() > 600.0 * std::log2(0.9));
+    CHECK(notes.back() < 600.0 * std::log2(1.1));
+  }
+  std::sort(notes.begin(), notes.end());
+  CHECK(std::adjacent_find(notes.begin(), notes.end(), [](double a, double b) {
+          return b - a < 1e-3;
+        }) == notes.end());
+  CHECK(notes.back() - notes.front() > 50.0);  // of 174
 }
 
 TEST_CASE("the rate differs from note to note by its deviation, and repeats", "[lfo]") {

@@ -383,7 +383,7 @@ TEST_CASE("errors in presets have a line and a column", "[preset]") {
       {m + "[[lfo]]\nname = \"v\"\nshape = \"saw\"", 4, 9, "'shape' must be sine, triangle"},
       {m + "[[lfo]]\nname = \"v\"\nby = \"note\"", 4, 6, "'by' must be \"pressure\", or"},
       {m + "[[lfo]]\nname = \"v\"\n[[control]]\nfrom = \"v\"\nto = \"in1\"\nrange = [0, 1]", 4, 1,
-       "an LFO moves \"pitch\" (in cents) or \"level\" (in dB)"},
+       "an LFO moves \"pitch\" (in cents), \"level\" (in dB) or a parameter"},
       {m + "[[lfo]]\nname = \"v\"\n[[control]]\nfrom = \"v\"\nto = \"pitch\"", 4, 1,
        "the control of an LFO needs 'range'"},
   };
