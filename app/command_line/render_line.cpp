@@ -16,7 +16,7 @@ const char* const render_examples =
     "A preset without a score plays a short phrase. A bare .mdl is the network alone: no gain, no\n"
     "smoothing, one channel per output. --all-presets writes a phrase and a note of every preset "
     "to the\n"
-    "folder, index.html with their envelopes, spectrograms and figures, and spectra.svg with all\n"
+    "folder, index.html with their envelopes, spectrograms and figures, and spectra.png with all\n"
     "spectrograms. It needs gnuplot and accepts only -o, -r and -q.\n"
     "Examples:\n"
     "  ressort render PolyTriangle -o out.wav\n"

@@ -33,12 +33,13 @@ Progress report_stages(const std::string& name) {
 }
 
 int put_figure(const std::string& path, const plot::Figure& figure, bool force) {
-  const auto svg = plot::to_svg(figure);
-  if (!svg) {
-    print_error(path + ": not drawn: " + svg.error().message);
+  const auto picture =
+      plot::draw(figure, path.ends_with(".png") ? plot::Format::png : plot::Format::svg);
+  if (!picture) {
+    print_error(path + ": not drawn: " + picture.error().message);
     return exit_code::our_failure;
   }
-  return write_output(path, *svg, force);
+  return write_output(path, *picture, force);
 }
 
 Result<TemporaryFolder> TemporaryFolder::make() {

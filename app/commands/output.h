@@ -18,7 +18,8 @@ int reject(const std::string& message);
 // Returns a Progress that prints the stages of slow work. It never stops: Ctrl-C ends the process.
 Progress report_stages(const std::string& name);
 
-// Draws a figure and writes it as SVG; prints errors. Returns the exit code. [control]
+// Draws a figure and writes it, as PNG if the path ends with .png, else as SVG; prints errors.
+// Returns the exit code. [control]
 int put_figure(const std::string& path, const plot::Figure& figure, bool force);
 
 // A folder that is deleted with this object.

@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <string_view>
 
 namespace ressort::plot {
 namespace {
@@ -137,8 +138,10 @@ class ScriptWriter {
               caption_height_;
   }
 
-  std::string write() {
-    script_ = "set encoding utf8\nset terminal svg size " + number(width_) + "," + number(height_) +
+  std::string write(Format format) {
+    const std::string terminal = format == Format::svg ? "svg" : "pngcairo";
+    script_ = "set encoding utf8\nset terminal " + terminal + " size " + number(width_) + "," +
+              number(height_) +
               " font 'sans,11' background 'white'\nset multiplot\nset errorbars 0\n";
     if (!figure_.title.empty()) {
       script_ += "set label 1 " + quoted(figure_.title) + " at screen 0.5, screen " +
@@ -331,8 +334,8 @@ Axis frequency_axis(double from_hz, double to_hz) {
   return axis;
 }
 
-std::string to_script(const Figure& figure) {
-  return ScriptWriter(figure).write();
+std::string to_script(const Figure& figure, Format format) {
+  return ScriptWriter(figure).write(format);
 }
 
 Result<Done> check_gnuplot() {
@@ -343,25 +346,26 @@ Result<Done> check_gnuplot() {
                    "gnuplot-nox"};
 }
 
-Result<std::string> to_svg(const Figure& figure) {
+Result<std::string> draw(const Figure& figure, Format format) {
   if (auto found = check_gnuplot(); !found) {
     return found.error();
   }
-  const ScriptFile script(to_script(figure));
+  const ScriptFile script(to_script(figure, format));
   FILE* const gnuplot =
       script.is_written() ? popen(("gnuplot '" + script.path() + "'").c_str(), "r") : nullptr;
   if (gnuplot == nullptr) {
     return Error{"gnuplot cannot be started: '" + script.path() + "' cannot be written"};
   }
-  std::string svg;
+  std::string picture;
   std::array<char, 65536> buffer{};
   while (const std::size_t count = std::fread(buffer.data(), 1, buffer.size(), gnuplot)) {
-    svg.append(buffer.data(), count);
+    picture.append(buffer.data(), count);
   }
-  if (pclose(gnuplot) != 0 || !svg.ends_with("</svg>\n\n")) {
+  const std::string_view end = format == Format::svg ? "</svg>\n\n" : "IEND\xae\x42\x60\x82";
+  if (pclose(gnuplot) != 0 || !picture.ends_with(end)) {
     return Error{"gnuplot failed to draw the figure"};
   }
-  return svg;
+  return picture;
 }
 
 std::string escaped(const std::string& text) {

@@ -1,4 +1,4 @@
-// app/plot: figures with axes, drawn by gnuplot as SVG.
+// app/plot: figures with axes, drawn by gnuplot as SVG or PNG.
 #pragma once
 
 #include <initializer_list>
@@ -78,14 +78,17 @@ struct Figure {
   std::size_t legend_columns = 3;
 };
 
-// Returns the gnuplot commands that draw the figure as SVG to standard output. Pure.
-std::string to_script(const Figure& figure);
+// PNG is a fifth of the size of SVG for figures of many spectrograms.
+enum class Format { svg, png };
+
+// Returns the gnuplot commands that draw the figure to standard output. Pure.
+std::string to_script(const Figure& figure, Format format = Format::svg);
 
 // Fails if gnuplot is missing, with advice on what to install. [control]
 Result<Done> check_gnuplot();
 
 // Runs gnuplot and returns what it draws. [control] 0.1 s and more
-Result<std::string> to_svg(const Figure& figure);
+Result<std::string> draw(const Figure& figure, Format format = Format::svg);
 
 // Text between tags or in quotes of HTML and SVG.
 std::string escaped(const std::string& text);

@@ -121,7 +121,7 @@ void draw(const plot::Figure& figure, const std::filesystem::path& path) {
   if (figure.panels.empty()) {
     return;
   }
-  const auto svg = plot::to_svg(figure);
+  const auto svg = plot::draw(figure);
   if (!svg) {
     std::fprintf(stderr, "%s: %s\n", path.c_str(), svg.error().message.c_str());
     return;

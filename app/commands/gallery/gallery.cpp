@@ -166,7 +166,7 @@ ShownPreset show(const GalleryOptions& options, const std::string& name,
   shown.levels_dbfs = levels_db(phrase->sound, whole, whole.to_s / envelope_steps);
   shown.spectrogram = find_spectrogram(phrase->sound, whole, spectrogram_rows, spectrogram_columns);
   shown.figures = measure_sounds(*phrase, *note);
-  const auto drawing = plot::to_svg(preset_figure(shown));
+  const auto drawing = plot::draw(preset_figure(shown));
   if (!drawing) {
     shown.failure = drawing.error().message;
     return shown;
@@ -252,7 +252,7 @@ int gallery(const GalleryOptions& options, const ShouldContinue& should_continue
     return code;
   }
   if (const int code =
-          put_figure((folder / "spectra.svg").string(), gallery_figure(shown), is_forced)) {
+          put_figure((folder / "spectra.png").string(), gallery_figure(shown), is_forced)) {
     return code;
   }
   int code = exit_code::done;

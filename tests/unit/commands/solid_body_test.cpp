@@ -338,7 +338,7 @@ TEST_CASE("The figure shows every triangle of the surface in each mode", "[solid
   REQUIRE(modes);
   const plot::Figure figure = shapes_figure(*mesh, *modes, {{"a<b", 0, {0, 0, 1}}}, "a & b");
   REQUIRE(figure.panels.size() == 5);
-  const auto svg = plot::to_svg(figure);
+  const auto svg = plot::draw(figure);
   REQUIRE(svg);
   // Six sides of eight triangles in each mode, hidden ones included.
   std::size_t polygons = 0;
