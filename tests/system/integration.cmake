@@ -10,6 +10,7 @@ target_link_libraries(ressort_server_tests PRIVATE PkgConfig::JACK PkgConfig::LI
 target_compile_definitions(ressort_server_tests PRIVATE
   RESSORT_PROGRAM="$<TARGET_FILE:ressort>" RESSORT_SPY="$<TARGET_FILE:rtspy>"
   RESSORT_SOURCE="${CMAKE_SOURCE_DIR}")
+ressort_compile_like(ressort_server_tests ressort_tests)
 add_dependencies(ressort_server_tests ressort rtspy)
 
 # A sanitizer has its own malloc, which the spy library cannot replace.
@@ -39,9 +40,10 @@ set_tests_properties(examples PROPERTIES TIMEOUT 240 LABELS integration)
 
 # Compiles exported FAUST programs with faust and this C++ compiler.
 add_ressort_tests(ressort_export_tests system/export_test.cpp)
-target_link_libraries(ressort_export_tests PRIVATE ressort_test_networks ressort_app)
+target_link_libraries(ressort_export_tests PRIVATE ressort_test_support ressort_app)
 target_compile_definitions(ressort_export_tests PRIVATE
   RESSORT_PROGRAM="$<TARGET_FILE:ressort>" RESSORT_CXX="${CMAKE_CXX_COMPILER}")
+ressort_compile_like(ressort_export_tests ressort_tests)
 add_dependencies(ressort_export_tests ressort)
 add_test(NAME export COMMAND ressort_export_tests)
 set_tests_properties(export PROPERTIES TIMEOUT 300 LABELS integration COST 800)

@@ -25,7 +25,7 @@ namespace {
 constexpr std::size_t spectrogram_rows = 217;  // two per semitone of nine octaves, and one
 constexpr std::size_t spectrogram_columns = 400;
 constexpr std::size_t envelope_steps = 620;
-constexpr double ring_out_s = 2.15;
+constexpr double last_ring_s = 2.15;
 constexpr double margin_s = 0.15;  // cut from the end: half a window of the spectrogram
 constexpr double note_length_s = 6.0;
 constexpr int note_key = 57;
@@ -147,7 +147,7 @@ ShownPreset show(const GalleryOptions& options, const std::string& name,
   shown.description = scene->preset.description;
   const Register where = register_of(scene->preset);
   const std::vector<PhraseNote> notes = phrase_of(where);
-  const double length_s = notes.back().end_s + ring_out_s;
+  const double length_s = notes.back().end_s + last_ring_s;
   const int key = note_key + where.shift;
   const auto phrase = play_notes(options, name, name + ".wav", notes, length_s, 0, should_continue);
   const auto note =

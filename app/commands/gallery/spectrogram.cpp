@@ -8,8 +8,8 @@ namespace ressort::commands {
 namespace {
 
 constexpr double periods = 34.0;
-constexpr double shortest_s = 0.012;
-constexpr double longest_s = 0.3;
+constexpr double shortest_window_s = 0.012;
+constexpr double longest_window_s = 0.3;
 
 struct Wavelet {
   std::vector<double> re;
@@ -17,7 +17,7 @@ struct Wavelet {
 };
 
 Wavelet make_wavelet(double frequency_hz, double rate_hz) {
-  const double length_s = std::clamp(periods / frequency_hz, shortest_s, longest_s);
+  const double length_s = std::clamp(periods / frequency_hz, shortest_window_s, longest_window_s);
   const auto count = static_cast<std::size_t>(length_s * rate_hz) | 1U;
   Wavelet made{std::vector<double>(count), std::vector<double>(count)};
   for (std::size_t n = 0; n < count; ++n) {

@@ -13,7 +13,7 @@ namespace {
 
 using Bytes = std::span<const std::uint8_t>;
 
-constexpr double longest_s = 24.0 * 3600.0;
+constexpr double longest_file_s = 24.0 * 3600.0;
 
 // A parsed event. For a tempo, `count` is the length of a quarter note in microseconds.
 struct TrackEvent {
@@ -267,7 +267,7 @@ Result<MidiFile> parse_midi_file(Bytes file) {
   for (const TrackEvent& event : events) {
     midi.length_s += static_cast<double>(event.tick - tick) * tick_s;
     tick = event.tick;
-    if (midi.length_s > longest_s) {
+    if (midi.length_s > longest_file_s) {
       return Error{"longer than a day"};
     }
     switch (event.kind) {

@@ -9,9 +9,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::milliseconds poll_time{
+constexpr std::chrono::milliseconds analysis_interval{
     10};  // a third of a second of blocks of 16 frames fits into the ring
-constexpr std::size_t most_frames = 94;
+constexpr std::size_t most_kept_frames = 94;
 
 std::size_t recent_samples(double rate_hz) {
   return std::max(pitch_samples(rate_hz), TimbreWatch::frame + TimbreWatch::hop);
@@ -97,7 +97,7 @@ void TimbreWatch::analyse_output() {
                      [this](std::size_t, const FrameTimbre& timbre, const FrameAnalysis&) {
                        const std::lock_guard lock(mutex_);
                        frames_.push_back({++number_, timbre});
-                       if (frames_.size() > most_frames) {
+                       if (frames_.size() > most_kept_frames) {
                          frames_.pop_front();
                        }
                      });
@@ -127,7 +127,7 @@ void TimbreWatch::analyse_output() {
     lock.unlock();
     stream.add(samples);
     lock.lock();
-    wake_.wait_for(lock, poll_time, [this] { return stop_; });
+    wake_.wait_for(lock, analysis_interval, [this] { return stop_; });
     should_continue =
         is_whole && !stop_ && Clock::now() < until_ && process_.clock.read().rate_hz == rate_hz;
   }

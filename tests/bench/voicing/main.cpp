@@ -47,11 +47,9 @@ constexpr double loudness_tolerance_db = 1.5;
 constexpr double struck_attack_s = 0.020;
 constexpr double bowed_attack_s = 0.150;
 constexpr double most_release_s = 0.6;
-constexpr double most_offset_db = -60.0;
 constexpr double most_correlation = 0.9;
 constexpr double most_mono_loss_db = 3.1;  // two uncorrelated channels lose 3.01 dB
 constexpr double most_cents = 0.1;
-constexpr double silence_db = -60.0;
 constexpr double rates_hz[] = {44100.0, 48000.0, 96000.0};
 
 std::string number(double value, int digits, bool is_within) {

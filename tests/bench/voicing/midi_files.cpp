@@ -23,7 +23,6 @@ namespace ressort::voicing {
 namespace {
 
 constexpr double rate_hz = 48000.0;
-constexpr std::size_t block_frames = 256;
 constexpr double longest_ring_s = 30.0;  // of notes that no damper ends, after the file
 constexpr double least_lufs = -30.0;
 constexpr double most_lufs = -3.0;

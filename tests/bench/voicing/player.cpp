@@ -11,8 +11,6 @@
 namespace ressort::voicing {
 namespace {
 
-constexpr std::size_t block_frames = 256;
-
 Scene scene_of(const std::string& name, bool with_lfos) {
   auto scene = load_scene(name, {});
   if (!scene) {

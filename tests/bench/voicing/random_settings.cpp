@@ -25,9 +25,7 @@ constexpr double undamped_after_s = 16.0;  // for presets without damper, which 
 
 constexpr double loudest_db = 0.0;
 constexpr double softest_db = -40.0;
-constexpr double most_offset_db = -60.0;
 constexpr double most_step_db = -60.0;  // relative to the peak
-constexpr double silence_db = -60.0;    // relative to the peak
 
 constexpr int sustain_pedal = 64;
 constexpr int sostenuto_pedal = 66;

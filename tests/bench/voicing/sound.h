@@ -17,6 +17,10 @@ struct Stereo {
   Stereo part(double from_s, double to_s) const;
 };
 
+inline constexpr std::size_t block_frames = 256;
+inline constexpr double silence_db = -60.0;
+inline constexpr double most_offset_db = -60.0;
+
 double decibels(double ratio);  // 20 log10, at least -200
 
 double peak_of(const Stereo& sound);

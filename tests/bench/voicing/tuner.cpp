@@ -18,7 +18,6 @@ constexpr double most_partials_cents = 3.0;
 constexpr double late_s = 0.5;
 constexpr double early_s = 0.1;
 constexpr double short_db = -30.0;  // fall from the early to the late start
-constexpr double silence_db = -60.0;
 
 struct Reading {
   int key = 0;
