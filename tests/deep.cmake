@@ -1,13 +1,13 @@
 # The second tier: tests that take minutes. They run one after the other after all other tests. A test
 # that does not fit before RESSORT_DEADLINE is skipped. RESSORT_TURN rotates the order, so that all are
 # reached in turn.
-set(RESSORT_TURN 0 CACHE STRING "Which of the deep tests comes first")
 set(ressort_fuzzers model preset score midi smf scala console osc osc_packet flight panel)
 list(TRANSFORM ressort_fuzzers PREPEND fuzz_ OUTPUT_VARIABLE ressort_deep_tests)
 list(APPEND ressort_deep_tests arm everything_sanitized everything_more forms_everywhere
   accuracy_everywhere silence_everywhere modes_everywhere calculix_everywhere bodies_everywhere
-  bells_everywhere heard_pitch_everywhere tuner_44100
-  tuner_48000 tuner_96000 thorough bench lint scenes_more abuse_long callback_minute bows settings_more edits_more
+  bells_everywhere heard_pitch_everywhere tuner_44100 tuner_48000 tuner_96000 restrikes_all
+  command_line_all export_all thorough bench lint scenes_more abuse_long callback_minute bows
+  settings_more edits_more
   flights_everywhere server_killed installed soak races)
 list(LENGTH ressort_deep_tests ressort_deep_count)
 
@@ -25,10 +25,9 @@ foreach(fuzzer IN LISTS ressort_fuzzers)
   add_deep_test(fuzz_${fuzzer} 90 ${CMAKE_CURRENT_SOURCE_DIR}/fuzz/run 40 ${fuzzer})
 endforeach()
 
-# Every model with the same sanitizers, and more generated models.
+# Every model with the same sanitizers, and without, for longer, with more generated models.
 add_deep_test(everything_sanitized 240 ${CMAKE_CURRENT_SOURCE_DIR}/system/sanitized 0.1 200)
-add_deep_test(everything_more 120 $<TARGET_FILE:ressort_play_everything> 1 400 101
-  ${CMAKE_SOURCE_DIR}/presets)
+add_deep_test(everything_more 240 $<TARGET_FILE:ressort_play_everything> 1 400 101)
 
 # Compiles the engine for 64-bit ARM.
 add_deep_test(arm 60 ${CMAKE_CURRENT_SOURCE_DIR}/arm.sh ${CMAKE_SOURCE_DIR})
@@ -54,6 +53,17 @@ foreach(rate IN ITEMS 44100 48000 96000)
   add_deep_test(tuner_${rate} ${seconds} $<TARGET_FILE:ressort_voicing> --tuner ${rate}
     ${ressort_tuned})
 endforeach()
+
+# Exports at all rates.
+add_deep_test(export_all 60 ${CMAKE_COMMAND} -E env RESSORT_THOROUGH=1
+  $<TARGET_FILE:ressort_export_tests>)
+
+# A soft strike on a ringing note of each preset.
+add_deep_test(restrikes_all 30 $<TARGET_FILE:ressort_voicing> --restrikes 60)
+
+# The complete version of a test that the first tier shortens.
+add_deep_test(command_line_all 90 ${CMAKE_COMMAND} -E env RESSORT_THOROUGH=1
+  ${CMAKE_CURRENT_SOURCE_DIR}/system/command_line.sh $<TARGET_FILE:ressort> ${CMAKE_SOURCE_DIR})
 
 # Masses and bodies one per cent below and above the stability limit.
 add_deep_test(bodies_everywhere 60 $<TARGET_FILE:ressort_tests> "[bodies_everywhere]")
@@ -106,8 +116,9 @@ add_deep_test(settings_more 600 sh -c
   "exec $<TARGET_FILE:ressort_voicing> --random \${RESSORT_SETTINGS:-200}")
 
 # The complete version of tests that the first tier shortens (tests/support/thorough.h).
-add_deep_test(thorough 120 ${CMAKE_COMMAND} -E env RESSORT_THOROUGH=1 $<TARGET_FILE:ressort_tests>
-  "[ask],[watch],[notes_heard],[modes_passive],[session],[solid_body]")
+add_deep_test(thorough 240 ${CMAKE_COMMAND} -E env RESSORT_THOROUGH=1 $<TARGET_FILE:ressort_tests>
+  "[ask],[heard_pitch],[hybrids],[identify],[models],[modes_passive],[notes_heard],[session],\
+[solid_body],[solid_modes],[watch]")
 
 # Checks that the benchmark runs. No time is asserted. Only tests/run --deep builds it.
 add_custom_target(ressort_deep DEPENDS ressort_bench)
@@ -141,7 +152,7 @@ if(NOT RESSORT_ADDRESS_SANITIZER AND NOT RESSORT_THREAD_SANITIZER)
   target_precompile_headers(ressort_race_tests PRIVATE ${ressort_app_headers})
   target_compile_definitions(ressort_race_tests PRIVATE RESSORT_SOURCE="${CMAKE_SOURCE_DIR}")
   # The library comes after the instrumented objects, so that the linker prefers these.
-  target_link_libraries(ressort_race_tests PRIVATE ressort_test_main ressort_test_networks ressort_app
+  target_link_libraries(ressort_race_tests PRIVATE ressort_test_main ressort_test_support ressort_app
     Threads::Threads)
   add_dependencies(ressort_deep ressort_race_tests)
   add_deep_test(races 60 ${CMAKE_COMMAND} -E env TSAN_OPTIONS=halt_on_error=1

@@ -5,6 +5,7 @@
 #include "core/kernels/passive/clusters.h"
 #include "core/laws/laws.h"
 #include "tests/support/passive.h"
+#include "tests/support/thorough.h"
 
 namespace ressort::hybrids_test {
 namespace {
@@ -233,6 +234,7 @@ std::string one_of_three(int i) {
 
 TEST_CASE("links between masses, places and waveguides balance the energy", "[hybrids]") {
   double worst = 0.0;
+  std::size_t number_of_case = 0;
   for (const End& a : ends) {
     for (const End& b : ends) {
       const bool has_waveguide = a.text[1] == 'w' || b.text[1] == 'w';
@@ -242,6 +244,9 @@ TEST_CASE("links between masses, places and waveguides balance the energy", "[hy
           const bool has_plain = law == "spring" || law == "quadratic" || law == "cubic";
           if (has_plain && !has_waveguide) {
             continue;  // Its springs use the published scheme and have a stability limit.
+          }
+          if (!is_in_turn(number_of_case++, 4)) {
+            continue;
           }
           const std::string between = of(a.place, 'a') + " " + of(b.place, 'b');
           const std::string link =
@@ -475,7 +480,8 @@ TEST_CASE("any links among few places balance the energy", "[hybrids]") {
 TEST_CASE("random hybrids are stable below the limit of their masses", "[hybrids]") {
   Random random(1401);
   int grown = 0;
-  for (int net = 0; net < 300; ++net) {
+  const int nets = of_all(75, 300);
+  for (int net = 0; net < nets; ++net) {
     const auto number_in = [&](double lowest, double highest) {
       return number(std::exp(random.uniform(std::log(lowest), std::log(highest))));
     };
@@ -513,7 +519,7 @@ TEST_CASE("random hybrids are stable below the limit of their masses", "[hybrids
     CHECK(most_of(0.99 * limit) < 1e4);
     grown += most_of(1.01 * limit) >= 1e6 ? 1 : 0;
   }
-  CHECK(grown > 200);
+  CHECK(grown > nets * 2 / 3);
 }
 
 }  // namespace ressort::hybrids_test

@@ -1,6 +1,7 @@
 // tests: how much of the slow tests runs.
 #pragma once
 
+#include <cstddef>
 #include <cstdlib>
 
 namespace ressort::support {
@@ -14,6 +15,14 @@ inline bool is_thorough() {
 template <class Number>
 Number of_all(Number few, Number all) {
   return is_thorough() ? all : few;
+}
+
+// Returns whether this case of many is tested: all in the second tier, else one in `parts`, which
+// RESSORT_TURN selects. Continuous integration derives RESSORT_TURN from the commit.
+inline bool is_in_turn(std::size_t number, std::size_t parts) {
+  const char* const turn = std::getenv("RESSORT_TURN");
+  return is_thorough() ||
+         (number + (turn != nullptr ? std::strtoull(turn, nullptr, 10) : 0)) % parts == 0;
 }
 
 }  // namespace ressort::support

@@ -5,6 +5,7 @@
 #include "app/session/loader.h"
 #include "tests/support/pitch.h"
 #include "tests/support/player.h"
+#include "tests/support/thorough.h"
 
 namespace ressort::heard_pitch_test {
 namespace {
@@ -53,10 +54,13 @@ void check_keys(const std::string& name, double rate_hz, std::initializer_list<i
 }
 
 TEST_CASE("shipped instruments sound within a cent of their keys' pitch", "[heard_pitch]") {
-  for (const char* const name : {"Vibraphone", "Marimba", "Glockenspiel", "BassGuitar", "ElectricGuitar",
-                                 "PolyTriangle", "IPlayTheTriangle", "PluckedHarmonics",
-                                 "Resonator", "SixStructures", "ChurchBell", "Vibraphone"}) {
-    check_keys(name, 48000.0, {45, 69});
+  std::size_t number = 0;
+  for (const char* const name :
+       {"Vibraphone", "Marimba", "Glockenspiel", "BassGuitar", "ElectricGuitar", "PolyTriangle",
+        "IPlayTheTriangle", "PluckedHarmonics", "Resonator", "SixStructures", "ChurchBell"}) {
+    if (support::is_in_turn(number++, 2)) {
+      check_keys(name, 48000.0, {45, 69});
+    }
   }
 }
 

@@ -161,7 +161,7 @@ TEST_CASE("A ball from an STL file has the frequencies of Lamb with every mesher
   for (const Program& program :
        {Program{Mesher::own, "true", 28000.0}, Program{Mesher::gmsh, "gmsh", 15000.0},
         Program{Mesher::tetgen, "tetgen", 15000.0}}) {
-    if (program.mesher == Mesher::tetgen && !support::is_thorough()) {
+    if (program.mesher != Mesher::own && !support::is_thorough()) {
       continue;
     }
     if (!is_there(program.name)) {
