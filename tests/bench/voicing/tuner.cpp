@@ -47,7 +47,7 @@ std::optional<Reading> read(Player& player, int key) {
   const double to_s = from_s + (is_short ? std::max(0.4, 24.0 / hz) : seconds);
   const Stereo sound = all.part(from_s, to_s);
   const PartialsPitch partials = partials_pitch(sound, hz);
-  // In a band around the strongest partial, the neighbours are 5 standard deviations away.
+  // The band around the strongest partial leaves its neighbours 5 standard deviations away.
   const int n = partials.strongest;
   const Stereo band = band_around(all, n * hz, 0.2 / n).part(from_s, to_s);
   return Reading{.key = key,

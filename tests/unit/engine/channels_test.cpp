@@ -38,6 +38,24 @@ std::vector<double> heard(const std::vector<Event>& events, std::size_t frames =
   return player.y();
 }
 
+// Returns the sound of a string that a controller tightens.
+std::vector<double> tightened_by(int number, const std::vector<Event>& events) {
+  const std::string text = scenes::string("s", 10, "0.1", "0.0005") + "@in1 frcInput @s_m2\n" +
+                           scenes::output(1, "s_m6");
+  Preset preset = struck(4);
+  preset.parameters.push_back({.name = "s_K", .value = 0.1, .minimum = 0.1, .maximum = 0.2});
+  preset.controls.push_back({.source = ControlSource::controller,
+                             .number = number,
+                             .target = "s_K",
+                             .gesture = Gesture::parameter,
+                             .low = 0.1,
+                             .high = 0.2});
+  Player player(text, preset);
+  player.run(8000, events);
+  CHECK(player.heap_calls == 0);
+  return player.y();
+}
+
 // Returns the largest difference.
 double apart(const std::vector<double>& a, const std::vector<double>& b) {
   double most = 0.0;
@@ -247,24 +265,10 @@ TEST_CASE("channel modes end and reset their own channel as the standard says", 
 }
 
 TEST_CASE("RPN 5 sets the depth of the modulation wheel", "[channels]") {
-  // The wheel tightens the string.
-  const std::string text = scenes::string("s", 10, "0.1", "0.0005") + "@in1 frcInput @s_m2\n" +
-                           scenes::output(1, "s_m6");
-  Preset preset = struck(4);
-  preset.parameters.push_back({.name = "s_K", .value = 0.1, .minimum = 0.1, .maximum = 0.2});
-  preset.controls.push_back({.source = ControlSource::controller,
-                             .number = 1,
-                             .target = "s_K",
-                             .gesture = Gesture::parameter,
-                             .low = 0.1,
-                             .high = 0.2});
-  const auto played = [&](std::vector<Event> events, const std::vector<Event>& more = {}) {
+  const auto played = [](std::vector<Event> events, const std::vector<Event>& more = {}) {
     events.insert(events.end(), more.begin(), more.end());
     events.push_back(note_on(0, 60));
-    Player player(text, preset);
-    player.run(8000, events);
-    CHECK(player.heap_calls == 0);
-    return player.y();
+    return tightened_by(1, events);
   };
   const auto wheel = [](double value) { return controller(0, 1, value); };
   const std::vector<double> down = played({});
@@ -289,22 +293,9 @@ TEST_CASE("RPN 5 sets the depth of the modulation wheel", "[channels]") {
 }
 
 TEST_CASE("a reset and a panic lift the sustain pedal for the preset's controls", "[channels]") {
-  const std::string text = scenes::string("s", 10, "0.1", "0.0005") + "@in1 frcInput @s_m2\n" +
-                           scenes::output(1, "s_m6");
-  Preset preset = struck(4);
-  preset.parameters.push_back({.name = "s_K", .value = 0.1, .minimum = 0.1, .maximum = 0.2});
-  preset.controls.push_back({.source = ControlSource::controller,
-                             .number = 64,
-                             .target = "s_K",
-                             .gesture = Gesture::parameter,
-                             .low = 0.1,
-                             .high = 0.2});
-  const auto played = [&](std::vector<Event> events) {
+  const auto played = [](std::vector<Event> events) {
     events.push_back(note_on(0, 60));
-    Player player(text, preset);
-    player.run(8000, events);
-    CHECK(player.heap_calls == 0);
-    return player.y();
+    return tightened_by(64, events);
   };
   const std::vector<double> up = played({});
   REQUIRE(apart(up, played({turned(0, 0, 64, 127)})) > 1e-3);
