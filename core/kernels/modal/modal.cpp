@@ -124,6 +124,7 @@ class StateLayout {
     state.inputs.late = arena_.take(modes_.pushes.size());
     state.inputs.amplitude = arena_.take(max_block_frames * modes_.pushes.size());
     state.ends.compliance = arena_.take(places);
+    state.ends.soft_speed = arena_.take(stride_);
     state.ends.x = arena_.take(ends);
     state.ends.v = arena_.take(ends);
     state.ends.force = arena_.take(ends);
@@ -133,12 +134,17 @@ class StateLayout {
     state.sweep.speed = arena_.take(most_rows + places + modes_.pushes.size());
     state.sweep.heard = arena_.take(most_rows + modes_.outputs.size());
     state.sweep.bundle = arena_.take(most_rows * row_);
-    state.sweep.seen = arena_.take(max_block_frames * observed);
     state.forces.count = static_cast<std::size_t>(
         std::count_if(modes_.outputs.begin(), modes_.outputs.end(),
                       [](const ModalOutput& output) { return output.is_force; }));
+    state.sweep.seen = arena_.take(max_block_frames * (observed + state.forces.count));
     state.forces.rows = arena_.take(2 * state.forces.count * stride_);
     state.forces.still = arena_.take(state.forces.count);
+    state.forces.damped = arena_.take(state.forces.count);
+    state.forces.before = arena_.take(state.forces.count);
+    state.inputs.are_forces =
+        std::all_of(modes_.pushes.begin(), modes_.pushes.end(),
+                    [](const ModalPush& push) { return push.by == ModalPush::By::force; });
     state.ends.exerted = arena_.take(ends);
     state.saved.x = arena_.take(ends);
     state.saved.v = arena_.take(ends);
@@ -235,9 +241,9 @@ ModalKernel<T>::ModalKernel(const Program& program, const Modes& modes, std::siz
       program_(program),
       modes_(modes),
       step_(with_isa(isa, [&]<Isa level>() { return modal_step<level, T>(modes.is_crossed); })),
-      rows_(modes.places.size() + modes.pushes.size() + modes.outputs.size() + most_rows),
+      rows_(modes.places.size() + modes.pushes.size() + 2 * modes.outputs.size() + most_rows),
       bundled_rows_(rows_.size()),
-      indices_(modes.pushes.size() + 2 * modes.places.size() + modes.holds.size()),
+      indices_(modes.pushes.size() + 2 * modes.places.size() + modes.holds.size() + modes.modes),
       held_ends_(link_count(modes)),
       passive_(passive_links(program, modes)),
       state_{} {
@@ -254,6 +260,7 @@ ModalKernel<T>::ModalKernel(const Program& program, const Modes& modes, std::siz
   state_.held.row_of = state_.inputs.push_of + modes.pushes.size();
   state_.held.place_of = state_.held.row_of + modes.places.size();
   state_.held.count_of = state_.held.place_of + modes.places.size();
+  state_.ends.soft = state_.held.count_of + modes.holds.size();
   state_.held.ends = held_ends_.data();
   state_.sleep.silence = static_cast<T>(modes.silence);
   state_.sleep.lately_kept =

@@ -110,6 +110,7 @@ struct ModalInputsPace {
 };
 template <class T>
 struct ModalInputs : ModalInputsPace {
+  bool are_forces;         // all of them; then a block of zeros pushes nothing
   std::uint32_t* push_of;  // [0, pushing) their indices
   T* amplitude;            // [frame][push]
   T* late;                 // [push] amplitude of the sample before, if it acts late
@@ -119,16 +120,19 @@ struct ModalInputs : ModalInputsPace {
 template <class T>
 struct ModalEndsPace {
   bool has_bounds = false;
-  T kick_norm = 0;  // growth of the norm by the links in their last block
+  T kick_norm = 0;             // growth of the norm by the links in their last block
+  std::size_t soft_modes = 0;  // modes that may drift
 };
 template <class T>
 struct ModalEnds : ModalEndsPace<T> {
-  T* x;           // [end] position
-  T* v;           // [end] change per sample
-  T* force;       // [end] summed by the plain links, used by the next sample
-  T* exerted;     // [end] by passive links, in this sample
-  T* kicked;      // [place] sum of the magnitudes of a block's kicks
-  T* compliance;  // [place] largest squared displacement per unit of energy
+  T* x;                 // [end] position
+  T* v;                 // [end] change per sample
+  T* force;             // [end] summed by the plain links, used by the next sample
+  T* exerted;           // [end] by passive links, in this sample
+  T* kicked;            // [place] sum of the magnitudes of a block's kicks
+  T* compliance;        // [place] largest squared displacement per unit of energy of modes not soft
+  std::uint32_t* soft;  // [0, soft_modes) indices of modes
+  T* soft_speed;        // [0, soft_modes) largest change per sample in this block
 };
 
 // The links that are computed in this block, and the places that they need.
@@ -197,8 +201,10 @@ struct ModalSaved : ModalSavedPace {
 template <class T>
 struct ModalForces {
   std::size_t count;
-  T* rows;   // [force][row of q, row of d][mode]
-  T* still;  // [force] with q and d at 0
+  T* rows;    // [force][row of q, row of d][mode]
+  T* still;   // [force] with q and d at 0
+  T* damped;  // [force] not 0 if the row of d has an element that is not 0
+  T* before;  // [force] sum along the row of d, of q before the block
 };
 
 template <class T>

@@ -2,12 +2,14 @@
 // within them. A part of modal_step.cpp.
 //
 // The discrete energy of a mode, m d^2 + lK (q - d/2)^2 with m = 1 - lZ/2 - lK/4, never grows
-// without a force. It bounds q^2 by the energy times 1/lK + 1/(4m). A soft mode may drift: for it
-// q^2 is added to the energy, and its velocity bounds its way in a block. The square root of the
-// energy is a norm, so the contributions of pushes add up (triangle inequality).
+// without a force. It bounds q^2 by the energy times 1/lK + 1/(4m), and d^2 by the energy over m.
+// The root of the ringing modes' total energy is a norm, so the contributions of pushes add up
+// (triangle inequality). A soft mode may drift far, such as a hammer that has left its string. Its
+// displacement is known and its speed is bounded, so it is bounded alone.
 #pragma once
 
-#include <limits>
+#include <algorithm>
+#include <cmath>
 
 #include "core/kernels/modal/modal_sweep.h"
 #include "core/laws/law.h"
@@ -17,7 +19,8 @@ namespace {
 
 constexpr double least_stiffness = 1e-4;  // lK from which on a mode is not soft
 constexpr double least_mass = 0.01;       // m, below which there is no bound
-constexpr double drift_frames = static_cast<double>(max_block_frames);
+constexpr double least_soft_mass = 0.5;   // the same for a soft mode
+constexpr double drift_frames = static_cast<double>(max_block_frames + 2);
 
 template <class T>
 struct Range {
@@ -30,31 +33,34 @@ struct Range {
   }
 };
 
-// Computes the largest square of each place's displacement for an energy of 1. Returns false if the
-// modes may gain energy by themselves.
+// Finds the soft modes, and the largest square of each place's displacement by the other modes for
+// an energy of 1. Returns false if the modes may gain energy by themselves.
 template <class T>
-bool measure_compliance(ModalState<T>& s, std::size_t places) {
-  for (std::size_t p = 0; p < places; ++p) {
-    s.ends.compliance[p] = 0;
-  }
-  for (std::size_t i = 0; i < s.shapes.modes; ++i) {
+bool measure_compliance(ModalState<T>& s, std::uint32_t modes, std::size_t places) {
+  std::fill_n(s.ends.compliance, places, T(0));
+  s.ends.soft_modes = 0;
+  for (std::uint32_t i = 0; i < modes; ++i) {
     const T k = s.motion.k[i];
     const T m = 1 - s.motion.z[i] / 2 - k / 4;
-    if (!(k >= 0 && s.motion.z[i] >= 0 && m > T(least_mass))) {
+    const bool is_soft = k < T(least_stiffness);
+    if (!(k >= 0 && s.motion.z[i] >= 0 && m > T(is_soft ? least_soft_mass : least_mass))) {
       return false;
     }
-    const T drift = T(drift_frames) * (1 + 1 / m);
-    const T square = T(least_stiffness) > k ? drift * drift : 1 / k + 1 / (4 * m);
+    if (is_soft) {
+      s.ends.soft[s.ends.soft_modes++] = i;
+      continue;
+    }
     for (std::size_t p = 0; p < places; ++p) {
       const T shape = s.shapes.places[p * s.shapes.row + i];
-      s.ends.compliance[p] += shape * shape * square;
+      s.ends.compliance[p] += shape * shape * (1 / k + 1 / (4 * m));
     }
   }
   return true;
 }
 
+// Returns the energy of the modes that are not soft.
 template <class T>
-T energy(const ModalState<T>& s) {
+T ringing_energy(const ModalState<T>& s) {
   using V = ModePack<T>;
   V sum{};
   for (std::size_t i = 0; i < pack_count(s); ++i) {
@@ -63,17 +69,46 @@ T energy(const ModalState<T>& s) {
     const V d = packs(s.motion.d)[i];
     const V m = 1 - packs(s.motion.z)[i] / 2 - k / 4;
     const V middle = q - d / 2;
-    const V soft =
-        select(k < V{} + T(least_stiffness), V{} + T(1 / (drift_frames * drift_frames)), V{});
-    sum += m * d * d + k * middle * middle + soft * q * q;
+    sum += select(k < V{} + T(least_stiffness), V{}, m * d * d + k * middle * middle);
   }
   return total<T>(sum);
+}
+
+// Computes the largest speeds of the soft modes without a force. Returns their sum.
+template <class T>
+T measure_soft_speeds(ModalState<T>& s) {
+  T sum = 0;
+  for (std::size_t j = 0; j < s.ends.soft_modes; ++j) {
+    const std::size_t i = s.ends.soft[j];
+    const T k = s.motion.k[i];
+    const T m = 1 - s.motion.z[i] / 2 - k / 4;
+    const T middle = s.motion.q[i] - s.motion.d[i] / 2;
+    s.ends.soft_speed[j] = std::sqrt(s.motion.d[i] * s.motion.d[i] + k / m * middle * middle);
+    sum += s.ends.soft_speed[j];
+  }
+  return sum;
+}
+
+// Returns the range of a place's displacement in a block, for a norm of the ringing modes and a
+// growth of each norm by kicks.
+template <class T>
+Range<T> displacement_of(const ModalState<T>& s, std::size_t place, T norm, T kicks) {
+  const T* const shape = s.shapes.places + place * s.shapes.row;
+  T here = 0;
+  T reach = (norm + kicks) * std::sqrt(s.ends.compliance[place]);
+  for (std::size_t j = 0; j < s.ends.soft_modes; ++j) {
+    const std::size_t i = s.ends.soft[j];
+    here += shape[i] * s.motion.q[i];
+    reach += T(drift_frames) * std::fabs(shape[i]) * (s.ends.soft_speed[j] + T(1.001) * kicks);
+  }
+  reach *= T(1.001);
+  return {here - reach, here + reach};
 }
 
 // Returns the growth of the norm by kicks that add up to `sum`, along a row of this length.
 template <class T>
 T norm_of_kicks(T sum, T length) {
-  return T(1.001) * sum * length;  // with a margin for soft modes and rounding
+  return T(1.001) * sum * length;  // with a margin for rounding
 }
 
 // Returns whether a link may exert a force while its distance is in a range.

@@ -69,22 +69,34 @@ struct ModalPlayer {
     if (s.motion.is_stale) {
       mix(0, s.motion.k, s.motion.z);
       mix_forces();
-      s.ends.has_bounds = !Crossed && measure_compliance(s, places);
+      s.ends.has_bounds = !Crossed && measure_compliance(s, modes.modes, places);
       if (s.sleep.silence > 0) {
         measure_ringing(s);
       }
       s.motion.is_stale = false;
     }
-    for (std::size_t n = first; n < first + frames; ++n) {
+    const bool is_quiet = has_quiet_inputs(first, frames);
+    for (std::size_t n = is_quiet ? first + frames - 1 : first; n < first + frames; ++n) {
       fill_amplitudes(n);
     }
-    find_pushes(first, frames);
+    if (is_quiet) {
+      s.inputs.pushing = 0;
+    } else {
+      find_pushes(first, frames);
+    }
     if (s.inputs.pushing > 0) {
       wake();
     }
     if (s.held.touched_frames > 0 || is_held() || !play_free(first, frames)) {
       play_touched(first, frames);
     }
+  }
+
+  // Returns whether all pushes are forces and all of them are 0.
+  bool has_quiet_inputs(std::size_t first, std::size_t frames) const {
+    const T* const value = block.value + first * inputs;
+    return s.inputs.are_forces &&
+           std::none_of(value, value + frames * inputs, [](T x) { return x != 0; });
   }
 
   // Computes the amplitude of each push in a sample.
@@ -132,14 +144,14 @@ struct ModalPlayer {
 
   // --- sample by sample -----------------------------------------------------------------------
 
-  // Computes a part in which links act. Assumes that the links add to the norm of the modes what
-  // they added in the last block, and computes only the links that can act within twice that norm.
-  // If the norm exceeds it, the part is computed again with all links.
+  // Computes a part in which links act. Assumes that the links add to the norm of the modes at most
+  // this norm and twice what they added in the last block, and computes only the links that can
+  // act then. If they add more, the part is computed again with all links.
   void play_touched(std::size_t first, std::size_t frames) {
-    const T norm = greatest_norm(first, frames);
-    const T most = 2 * (norm + s.ends.kick_norm);
+    const Motion motion = motion_in(first, frames);
+    const T most = motion.norm + motion.soft_speed + motion.kicks + 2 * s.ends.kick_norm;
     if (s.ends.has_bounds && s.held.surprised_frames == 0 && most > 0) {
-      hold_some(first, frames, most);
+      hold_some(first, frames, {.norm = motion.norm, .kicks = motion.kicks + most});
     } else {
       hold_all();
     }
@@ -150,7 +162,7 @@ struct ModalPlayer {
     play_bound<false>(first, frames);
     const auto passed = static_cast<std::uint32_t>(frames);
     s.held.surprised_frames -= passed < s.held.surprised_frames ? passed : s.held.surprised_frames;
-    if (!is_whole && !(norm + s.ends.kick_norm <= most)) {
+    if (!is_whole && !(s.ends.kick_norm <= most)) {
       s.held.surprised_frames = frames_after_touch;
       restore();
       hold_all();
@@ -352,6 +364,16 @@ struct ModalPlayer {
     T sum = s.forces.still[number] +
             (Crossed ? read<Crossed>(s, row)
                      : along(s, row, s.motion.q) + along(s, row + s.shapes.stride, s.motion.d));
+    sum += force_of_inputs(force, n);
+    for (const ModalForce::Weight& end : force.ends) {
+      sum += static_cast<T>(end.weight) * (s.ends.force[end.of] + s.ends.exerted[end.of]);
+    }
+    return static_cast<T>(force.scale) * sum;
+  }
+
+  // Returns the part of such a force that the inputs exert.
+  T force_of_inputs(const ModalForce& force, std::size_t n) const {
+    T sum = 0;
     const T* const value = block.value + n * inputs;
     const T* const velocity = block.velocity + n * inputs;
     for (const ModalForce::Hand& hand : force.hands) {
@@ -362,10 +384,7 @@ struct ModalPlayer {
     for (const ModalForce::Weight& input : force.inputs) {
       sum += static_cast<T>(input.weight) * value[input.of];
     }
-    for (const ModalForce::Weight& end : force.ends) {
-      sum += static_cast<T>(end.weight) * (s.ends.force[end.of] + s.ends.exerted[end.of]);
-    }
-    return static_cast<T>(force.scale) * sum;
+    return sum;
   }
 
   // --- free motion ----------------------------------------------------------------------------
@@ -373,17 +392,13 @@ struct ModalPlayer {
   // Computes the part a few samples at a time. Returns false, with the state as before, if a link
   // acts in it.
   bool play_free(std::size_t first, std::size_t frames) {
-    std::size_t rows = 0;
-    for (std::size_t o = 0; o < outputs; ++o) {
-      if (modes.outputs[o].is_place) {
-        s.sweep.rows[rows++] = s.shapes.outputs + o * s.shapes.row;
-      }
-    }
+    std::size_t rows = hear_outputs();
     const std::size_t heard = rows;
-    if (s.forces.count > 0 || s.inputs.pushing > 2 ||
-        (!modes.holds.empty() && !find_suspects(first, frames, rows)) || rows > most_heard) {
+    if (s.inputs.pushing > 2 || (!modes.holds.empty() && !find_suspects(first, frames, rows)) ||
+        rows > most_heard) {
       return false;
     }
+    remember_damped();
     if (rows > heard) {
       save();
     }
@@ -398,16 +413,48 @@ struct ModalPlayer {
     return true;
   }
 
+  // Chooses the rows of the outputs: one for a position, and one or two for a force. Returns their
+  // number.
+  std::size_t hear_outputs() {
+    std::size_t rows = 0;
+    std::size_t force = 0;
+    for (std::size_t o = 0; o < outputs; ++o) {
+      const ModalOutput& output = modes.outputs[o];
+      if (output.is_place) {
+        s.sweep.rows[rows++] = s.shapes.outputs + o * s.shapes.row;
+      } else if (output.is_force) {
+        const T* const row = s.forces.rows + 2 * force * s.shapes.stride;
+        s.sweep.rows[rows++] = row;
+        if (has_damped_row(force++)) {
+          s.sweep.rows[rows++] = row + s.shapes.stride;
+        }
+      }
+    }
+    return rows;
+  }
+  // Returns whether dampers act on this output, which is a force. Crossed modes have one row.
+  bool has_damped_row(std::size_t force) const { return !Crossed && s.forces.damped[force] != 0; }
+
+  // Stores what the dampers' row reads before the part: d is the change of q per sample.
+  void remember_damped() {
+    for (std::size_t force = 0; force < s.forces.count; ++force) {
+      if (has_damped_row(force)) {
+        s.forces.before[force] =
+            along(s, s.forces.rows + (2 * force + 1) * s.shapes.stride, s.motion.q);
+      }
+    }
+  }
+
   // Adds the places to the rows whose links may act. Returns false if a link acts in any case.
   bool find_suspects(std::size_t first, std::size_t frames, std::size_t& rows) {
     for (std::size_t p = 0; p < places; ++p) {
       s.held.row_of[p] = nowhere;
     }
-    const T norm = greatest_norm(first, frames);
+    const Motion motion = motion_in(first, frames);
     for (const ModalHold& hold : modes.holds) {
       const LinkRun& run = program.link_runs[hold.run];
       for (std::size_t i = 0; i < hold.a.size(); ++i) {
-        if (!may_act_within(run, hold.a[i], hold.b[i], first, frames, norm)) {
+        if (!may_act_within(run, hold.a[i], hold.b[i], first, frames, motion)) {
           continue;
         }
         if (!can_detach(run.law)) {
@@ -520,17 +567,37 @@ struct ModalPlayer {
   }
 
   void write_outputs(std::size_t first, std::size_t frames) {
-    std::size_t row = 0;
+    std::size_t force = 0;
+    const T* seen = s.sweep.seen;
     for (std::size_t o = 0; o < outputs; ++o) {
       const ModalOutput& output = modes.outputs[o];
       T* out = block.outputs + first * outputs + o;
-      const T* const seen = s.sweep.seen + row * max_block_frames;
+      if (output.is_force) {
+        seen = write_force(output.force, force++, seen, out, first, frames);
+        continue;
+      }
       const T rest = static_cast<T>(output.place.rest);
       for (std::size_t n = 0; n < frames; ++n, out += outputs) {
         *out = output.is_place ? rest + seen[n] : position_of(output.end, first + n);
       }
-      row += output.is_place;
+      seen += output.is_place ? max_block_frames : 0;
     }
+  }
+  // Writes a force while no link acts. Returns where the next output's row was seen.
+  const T* write_force(const ModalForce& force, std::size_t number, const T* seen, T* out,
+                       std::size_t first, std::size_t frames) {
+    const bool has_damped = has_damped_row(number);
+    const T* const damped = seen + max_block_frames;
+    T before = has_damped ? s.forces.before[number] : T(0);
+    for (std::size_t n = 0; n < frames; ++n, out += outputs) {
+      T sum = s.forces.still[number] + seen[n];
+      if (has_damped) {
+        sum += damped[n] - before;
+        before = damped[n];
+      }
+      *out = static_cast<T>(force.scale) * (sum + force_of_inputs(force, first + n));
+    }
+    return seen + (has_damped ? 2 : 1) * max_block_frames;
   }
 
   // --- links ------------------------------------------------------------------------------------
@@ -570,25 +637,34 @@ struct ModalPlayer {
     }
   }
 
-  // Returns a bound on the norm of the modes in this part, without the forces of links.
-  T greatest_norm(std::size_t first, std::size_t frames) const {
-    T norm = std::sqrt(energy(s));
-    for (std::size_t j = 0; j < pushes; ++j) {
+  // Bounds on the motion of the modes in a part.
+  struct Motion {
+    T norm;            // of the modes that are not soft, at the start
+    T soft_speed = 0;  // sum over the soft modes, at the start
+    T kicks;           // growth of the norm
+  };
+  // Returns these bounds without the forces of links.
+  Motion motion_in(std::size_t first, std::size_t frames) {
+    Motion motion{
+        .norm = std::sqrt(ringing_energy(s)), .soft_speed = measure_soft_speeds(s), .kicks = 0};
+    for (std::size_t r = 0; r < s.inputs.pushing; ++r) {
+      const std::size_t j = s.inputs.push_of[r];
       T sum = 0;
       for (std::size_t n = first; n < first + frames; ++n) {
         sum += absolute(s.inputs.amplitude[n * pushes + j]);
       }
-      norm += norm_of_kicks(sum, s.shapes.push_norm[j]);
+      motion.kicks += norm_of_kicks(sum, s.shapes.push_norm[j]);
     }
-    return norm;
+    return motion;
   }
 
   // Returns the range of positions of an end in this part and in the two samples before it.
-  Range<T> range_of(std::uint32_t end, std::size_t first, std::size_t frames, T norm) const {
+  Range<T> range_of(std::uint32_t end, std::size_t first, std::size_t frames,
+                    const Motion& motion) const {
     if (end < places) {
-      const T reach = T(1.001) * norm * std::sqrt(s.ends.compliance[end]);
+      const Range<T> range = displacement_of(s, end, motion.norm, motion.kicks);
       const T rest = static_cast<T>(modes.places[end].rest);
-      return {rest - reach, rest + reach};
+      return {rest + range.low, rest + range.high};
     }
     Range<T> range{s.ends.x[end], s.ends.x[end]};
     range.take(s.ends.x[end] - s.ends.v[end]);
@@ -598,12 +674,12 @@ struct ModalPlayer {
     return range;
   }
   bool may_act_within(const LinkRun& run, std::uint32_t a, std::uint32_t b, std::size_t first,
-                      std::size_t frames, T norm) const {
+                      std::size_t frames, const Motion& motion) const {
     if (!s.ends.has_bounds) {
       return true;
     }
-    const Range<T> at = range_of(a, first, frames, norm);
-    const Range<T> to = range_of(b, first, frames, norm);
+    const Range<T> at = range_of(a, first, frames, motion);
+    const Range<T> to = range_of(b, first, frames, motion);
     return may_act<T>(run, s.ramps.value, {at.low - to.high, at.high - to.low});
   }
 
@@ -636,10 +712,10 @@ struct ModalPlayer {
   void hold_all() {
     choose_links([](const LinkRun&, std::uint32_t, std::uint32_t) { return true; });
   }
-  void hold_some(std::size_t first, std::size_t frames, T norm) {
+  void hold_some(std::size_t first, std::size_t frames, const Motion& motion) {
     choose_links([&](const LinkRun& run, std::uint32_t a, std::uint32_t b) {
       return (a < places && s.ends.force[a] != 0) || (b < places && s.ends.force[b] != 0) ||
-             may_act_within(run, a, b, first, frames, norm);
+             may_act_within(run, a, b, first, frames, motion);
     });
   }
   // Chooses the links to compute and the places that they need.
@@ -830,9 +906,8 @@ struct ModalPlayer {
     if (ahead == 0) {
       return s.ramps.value[c];
     }
-    return ahead < s.ramps.frames
-               ? s.ramps.value[c] + static_cast<T>(ahead) * s.ramps.increment[c]
-               : s.ramps.target[c];
+    return ahead < s.ramps.frames ? s.ramps.value[c] + static_cast<T>(ahead) * s.ramps.increment[c]
+                                  : s.ramps.target[c];
   }
 
   // Computes lK and lZ some samples ahead.
@@ -901,6 +976,9 @@ struct ModalPlayer {
         }
         still += c * static_cast<T>(part.constant);
       }
+      const T* const damped = rows + s.shapes.stride;
+      s.forces.damped[force] =
+          std::any_of(damped, damped + s.shapes.stride, [](T x) { return x != 0; }) ? T(1) : T(0);
       s.forces.still[force++] = still;
     }
   }

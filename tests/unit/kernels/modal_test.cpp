@@ -188,6 +188,22 @@ TEST_CASE("A strike acts on distant links within its block", "[modal]") {
   }
 }
 
+TEST_CASE("A hammer drifts away from a string and returns", "[modal]") {
+  // The hammer's mode is soft (lK = 1e-6, 2 pi 1000 samples a period), so between two blows it flies
+  // much further than the string moves. The forces of springs and dampers are heard meanwhile.
+  const Program program = modal_program(
+      scenes::string("s", 20, "0.1", "0.01") + "@g ground 0.05\n@h mass s_M 0.05 0.\n" +
+      "@back spring @g @h 1e-6\n@in1 frcInput @h\n@blow contact @h @s_m7 0.05 0.001 0.\n" +
+      "@out1 frcOutput @s_m3\n@out2 posOutput @h\n" + scenes::output(3, "s_m12"));
+  for (const std::uint64_t seed : {1u, 2u, 3u}) {
+    for (const Isa isa : isas()) {
+      check_same<double>(
+          program,
+          {.frames = 12000, .seed = seed, .reach = 1e-7, .highest_hz = 10.0, .isa = isa}, 1e-9);
+    }
+  }
+}
+
 TEST_CASE("Links are tested even if the energy gives no bound", "[modal]") {
   const Program program = modal_program(
       "@g ground 0.\n@in1 posInput 0.01\n@a mass 1. 0.01 0.\n@h spring @g @a 3.98\n"
