@@ -312,7 +312,6 @@ Playing make_playing(const Network& network, const Preset& preset, const Proof& 
       .bare = bare,
       .damper_s = preset.damper_s,
       .damper_keys = preset.damper_keys,
-      .decay_s = preset.decay_s,
       .keys_db = preset.keys_db,
       .noise = preset.noise,
       .tuning = keys.mode ? Tuning::keyboard : Tuning::fixed,

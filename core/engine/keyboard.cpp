@@ -262,8 +262,7 @@ void Keyboard::damp(Voice& voice) const {
   const double damper_s = playing_.damper_on(voice.has_key ? voice.key : middle_c);
   const bool may_lie = voice.is_released && !voice.latched && damper_s > 0.0;
   const double share = voice.is_replaced ? 1.0 : may_lie ? channels_.damper(voice.channel) : 0.0;
-  const bool has_decay = voice.has_key && !playing_.decay_s.empty();
-  voices.damp(voice, share, has_decay ? 1.0 / value_at(playing_.decay_s, voice.key) : 0.0);
+  voices.damp(voice, share);
 }
 
 void Keyboard::forget_keys(ChannelMask channels) {

@@ -103,7 +103,6 @@ struct Playing {
   bool bare = false;                // the network alone: no ramps, no smoothing, no sleep
   double damper_s = 0.0;            // T60 of a released voice; 0: it rings freely
   std::vector<CurvePoint> damper_keys;  // the same by key; replaces `damper_s`
-  std::vector<CurvePoint> decay_s;  // T60 by key, on top of the model's decay; empty: none
   std::vector<CurvePoint> keys_db;  // gain by key; empty: 0 dB
   bool noise = false;               // the outputs modulate white noise
   Tuning tuning = Tuning::fixed;

@@ -152,10 +152,9 @@ Voice& Voices::take_lane() {
 
 // --- gains --------------------------------------------------------------------------------------
 
-void Voices::damp(Voice& voice, double share, double extra_per_s) const {
+void Voices::damp(Voice& voice, double share) const {
   constexpr double decades_of_t60 = 3.0;
-  // decay in units of 60 dB
-  const double per_s = share / std::max(1e-3, voice.release_s) + extra_per_s;
+  const double per_s = share / std::max(1e-3, voice.release_s);  // in units of 60 dB
   voice.decay.kept_goal = std::pow(10.0, -decades_of_t60 * per_s / rate_hz_);
 }
 

@@ -150,9 +150,8 @@ class Voices {
     return least;
   }
 
-  // Sets the damper: `share` of it lies on the voice, and `extra_per_s` is the decay of its key in
-  // units of 60 dB per second.
-  void damp(Voice& voice, double share, double extra_per_s) const;
+  // Sets the damper: `share` of it lies on the voice.
+  void damp(Voice& voice, double share) const;
   // Ramps the volume to strength * `level` within 20 ms.
   void ramp_volume(Voice& voice, const SideGains& level) const;
   // Ramps it within one block, or to the end of the current ramp.

@@ -72,7 +72,6 @@ bool differs_in_numbers_only(const Preset& a, const Preset& b) {
     preset.gain = preset.damper_s = preset.glide_s = preset.velocity = 0.0;
     preset.velocity_points.clear();
     preset.damper_keys.clear();
-    preset.decay_s.clear();
     preset.keys_db.clear();
     for (ControlSetting& control : preset.controls) {
       control = {.source = control.source,

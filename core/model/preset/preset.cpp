@@ -918,14 +918,6 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
     preset.tuned_along_location = location_of(*root.get("tuned_along"));
   }
   read_by_key(root, reader,
-              {.name = "decay_s",
-               .example = "[[36, 12], [96, 2]]",
-               .point = "[key, seconds]",
-               .least = {0.0, 0.001},
-               .most = {127.0, 600.0},
-               .bounds = "a key lies between 0 and 127, its seconds between 0.001 and 600"},
-              preset.decay_s);
-  read_by_key(root, reader,
               {.name = "keys_db",
                .example = "[[36, 7], [60, 0]]",
                .point = "[key, dB]",

@@ -120,8 +120,6 @@ struct Preset {
   double gain = 1.0;      // output per unit of position
   double damper_s = 0.0;  // T60 after note-off; 0: no damper
   std::vector<CurvePoint> damper_keys;  // the same by key; replaces `damper_s`, then of middle C
-  // Additional T60 of a held note, by key: keys and seconds, ascending; empty: none.
-  std::vector<CurvePoint> decay_s;
   std::vector<CurvePoint> keys_db;  // gain by key: keys and dB, ascending; empty: 0
   bool noise = false;               // the outputs modulate white noise
   bool keyboard = true;             // keys set the pitch

@@ -13,7 +13,6 @@ constexpr PresetKey keys[] = {
     {"", "voices", "1 to 256 (1)", "number of notes that sound at the same time"},
     {"", "gain", "0 to 1e9 (1)", "output per unit of position; a forte note should peak near -12 dBFS"},
     {"", "damper_s", "0 to 60 (0), or [[21, 0.4], [88, 0.2], [89, 0]]", "T60 of a note after its key is released; 0 lets it ring out; or up to 16 points of key and seconds, joined by straight lines, such as for a piano, whose top keys have no dampers"},
-    {"", "decay_s", "0.001 to 600, or [[36, 12], [96, 2]]", "extra decay while the key is down: T60 of the damping added to the model's own (1/T60 is the sum of both), for struck and plucked notes; or up to 16 points of key and seconds, joined by straight lines"},
     {"", "keys_db", "-40 to 40 (0), or [[36, 7], [60, 0]]", "level added to `gain`; or up to 16 points of key and dB, joined by straight lines, to compensate a model that is softer at one end of the keyboard"},
     {"", "noise", "true or false (false)", "whether the outputs modulate white noise instead of being heard"},
     {"", "tuning", "`keyboard` or `fixed` (`keyboard`)", "`keyboard`: a key sets the pitch; `fixed`: every key plays the model as written"},

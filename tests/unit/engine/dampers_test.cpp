@@ -124,50 +124,6 @@ TEST_CASE("a live pluck without a key is damped when the last key is released", 
               note_off(15000, 62)}) < 1e-5);
 }
 
-TEST_CASE("a decay by key has its T60, with a damper and with a pedal too", "[dampers]") {
-  Preset preset = damped(0.4);
-  preset.decay_s = {{48.0, 2.0}, {72.0, 0.5}};
-  for (const auto& [key, seconds] : {std::pair(36, 2.0), std::pair(48, 2.0), std::pair(60, 1.25),
-                                     std::pair(72, 0.5), std::pair(96, 0.5)}) {
-    Player rings(ringing_string(), damped(0.4));
-    rings.run(30000, {note_on(0, key)});
-    Player player(ringing_string(), preset);
-    player.run(30000, {note_on(0, key)});
-    INFO(key);
-    CHECK(t60_s(player, rings, 4000, 12000) == Approx(seconds).epsilon(1e-3));
-    // The rates 1/T60 add up.
-    Player let_go(ringing_string(), preset);
-    let_go.run(30000, {note_on(0, key), note_off(2000, key)});
-    CHECK(t60_s(let_go, rings, 4000, 6000) ==
-          Approx(1.0 / (1.0 / seconds + 1.0 / 0.4)).epsilon(1e-3));
-    Player sustained(ringing_string(), preset);
-    sustained.run(30000, {note_on(0, key), controller(500, 64, 1.0), note_off(2000, key)});
-    CHECK(sustained.y() == player.y());
-  }
-}
-
-TEST_CASE("a mono voice with a decay by key is struck anew, but only moves in legato",
-          "[dampers]") {
-  Preset preset = damped(0.4, 4);
-  preset.mono = true;
-  preset.decay_s = {{0.0, 1.0}};
-  const auto played = [&](bool legato) {
-    preset.legato = legato;
-    Player player(ringing_string(), preset);
-    player.run(40000, {note_on(0, 60), note_on(20000, 64)});
-    return player.y();
-  };
-  Player other(ringing_string(), preset);
-  other.run(20000, {note_on(0, 64)});
-  const auto late = [](const std::vector<double>& y) { return peak(std::span(y).subspan(30000)); };
-  // The voice is new: 10 000 frames after its stroke it is as loud as a voice that was struck only
-  // once. The first stroke lost 27 dB in 20 000 frames and is damped with a T60 of 0.2 s, so it is
-  // 95 dB lower.
-  CHECK(late(played(false)) == Approx(peak(std::span(other.y()).subspan(10000))).epsilon(1e-3));
-  CHECK(late(played(true)) < 0.1 * late(played(false)));
-  CHECK(late(played(true)) > 0.001 * late(played(false)));
-}
-
 TEST_CASE("a fully damped note ends", "[dampers]") {
   Player player(ringing_string(), damped(0.1, 4));
   player.run(44100, {note_on(0, 60), note_on(0, 64), note_off(100, 60), note_off(100, 64)});

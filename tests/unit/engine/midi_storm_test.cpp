@@ -90,7 +90,7 @@ TEST_CASE("a million messages leave no hanging note", "[midi_storm]") {
   for (const bool mono : {false, true}) {
     Preset preset = struck(6);
     preset.damper_s = 0.01;
-    preset.decay_s = {{36.0, 4.0}, {96.0, 0.5}};
+    preset.damper_keys = {{36.0, 0.02}, {96.0, 0.005}};
     preset.mono = preset.legato = mono;
     preset.controls.push_back({.source = ControlSource::pressure, .target = "in2"});
     preset.controls.push_back({.source = ControlSource::controller, .number = 74, .target = "in2"});
