@@ -132,7 +132,6 @@ class ThreadPool::Team final : public Crew {
         continue;
       }
       if (claims_[i].leave()) {
-        pool_.taken_over_.add(1);
         tasks_[i]->take_over();
       } else {
         tasks_[i]->accept();

@@ -22,8 +22,6 @@ class ThreadPool final : public Executor {
   std::unique_ptr<Crew> gather(std::vector<Task*> tasks) override;
   // Gives the helpers real-time priority. Does nothing without the permission. [control]
   void set_priority(int priority);
-  // Number of tasks that were taken over from a late helper. [any thread]
-  std::uint64_t taken_over() const { return taken_over_.get(); }
 
  private:
   class Team;
@@ -36,7 +34,6 @@ class ThreadPool final : public Executor {
   AtomicTime period_ns_;  // 0: unknown
   // frame of the newest period; only the thread that shows a team uses it
   std::int64_t frame_ = -1;
-  Counter taken_over_;
   Flag ends_;
   std::vector<std::jthread> threads_;
 };
