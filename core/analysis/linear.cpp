@@ -434,10 +434,4 @@ std::optional<LowestShapes> lowest_shapes(const Network& network,
   return found;
 }
 
-std::optional<Mode> lowest_mode(const Network& network, std::span<const double> parameters,
-                                const Progress& progress) {
-  const auto found = lowest_shapes(network, parameters, progress);
-  return found ? std::optional(found->mode) : std::nullopt;
-}
-
 }  // namespace ressort::analysis

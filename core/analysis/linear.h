@@ -25,14 +25,6 @@ struct Mode {
 // rate_hz: cos(theta) = (2 - k - z) / (2 sqrt(1 - z)). [any thread]
 double scheme_frequency_hz(double stiffness, double damping, double rate_hz);
 
-// Returns the lowest mode that is not a rigid motion. Only springs, dampers and oscillators count:
-// plucks, bows and contacts are open, position inputs are held. Its damping is the modal share of
-// Z. Empty if no mass has a spring, or if the links are so random or so dense that a factorisation
-// would take too long (Cholesky::most_work). Sparse shift-and-invert: milliseconds for 1000 masses.
-// [any thread but audio]
-std::optional<Mode> lowest_mode(const Network& network, std::span<const double> parameters,
-                                const Progress& progress = {});
-
 // The network reduced to a small basis from which its lowest damped mode can be computed: the
 // lowest undamped mode first, a few more of the lowest, and the static response of the others to
 // its dampers. M is the identity.
@@ -45,8 +37,11 @@ struct LowestShapes {
   double share_of_modes = 0.0;  // Share of bodies in the lowest mode's motion, 0 to 1.
 };
 
-// Returns the reduced network for the same networks and in the same time as lowest_mode(). [any
-// thread but audio]
+// Returns the reduced network, with the lowest mode that is not a rigid motion. Only springs,
+// dampers and oscillators count: plucks, bows and contacts are open, position inputs are held. The
+// mode's damping is the modal share of Z. Empty if no mass has a spring, or if the links are so
+// random or so dense that a factorisation would take too long (Cholesky::most_work). Sparse
+// shift-and-invert: milliseconds for 1000 masses. [any thread but audio]
 std::optional<LowestShapes> lowest_shapes(const Network& network,
                                           std::span<const double> parameters,
                                           const Progress& progress = {});

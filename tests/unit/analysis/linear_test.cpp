@@ -10,6 +10,11 @@ namespace {
 using support::network_of;
 using support::show;
 
+std::optional<Mode> lowest_mode(const Network& network, std::span<const double> parameters) {
+  const auto shapes = lowest_shapes(network, parameters);
+  return shapes ? std::optional(shapes->mode) : std::nullopt;
+}
+
 std::optional<Mode> mode_of(const std::string& text) {
   const Network network = network_of(text);
   return lowest_mode(network, parameter_values(network));

@@ -142,13 +142,13 @@ TEST_CASE("A large random network is checked by the edge bound and has no lowest
   const Network network = support::network_of(tangle(4000));
   const std::vector<double> values = {0.01};
   const Progress progress([](std::string_view) { return true; });
-  CHECK_FALSE(lowest_mode(network, values, progress));
+  CHECK_FALSE(lowest_shapes(network, values, progress));
   Stability stability(network, 1.0, Stability::most_exact_masses, progress);
   CHECK_FALSE(stability.is_exact());
   CHECK(stability.prove({values, values}) == Verdict::stable);
   // A chain of this size is easy.
   const Network straight = support::network_of(chain(4000));
-  CHECK(lowest_mode(straight, values, progress));
+  CHECK(lowest_shapes(straight, values, progress));
   CHECK(Stability(straight, 1.0).is_exact());
 }
 
