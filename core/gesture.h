@@ -50,13 +50,6 @@ enum class Live : std::uint8_t {
   by_preset,     // /in/N/NAME plays an input for which the preset has a control of this gesture
 };
 
-// The distance over which a gesture drives an input.
-enum class Extent : std::uint8_t {
-  range,   // of positions (or forces): low..high of the control
-  travel,  // of positions, on both sides of 0
-  endless,
-};
-
 struct GestureRow {
   Gesture gesture;
   std::string_view name;  // `how` in a preset, /in/N/NAME
@@ -64,11 +57,8 @@ struct GestureRow {
   std::string_view does = {};          // effect on the input; empty: a preset cannot use it
   bool needs_position = false;         // cannot play a force input
   std::string_view needs_travel = {};  // meaning of `travel` if it must be above 0; else empty
-  // Stability checks.
-  Extent extent = Extent::range;
-  bool is_blow = false;   // its range is the size of a blow, not of a lasting force
-  bool is_sweep = false;  // its range is the speed at which it passes the string
-  bool is_touch = false;  // it excites nothing, so it does not wake a sleeping voice
+  bool is_blow = false;                // its range is the size of a blow, not of a lasting force
+  bool is_touch = false;               // it excites nothing, so it does not wake a sleeping voice
   // Returns the position at which a new voice's driver starts; null: the input's own.
   double (*start)(const Stroke& control) = nullptr;
   // Returns the position to which it drives the input in all voices, new ones too. [audio]
@@ -119,8 +109,6 @@ inline constexpr GestureRow gestures[] = {
              "slower is louder",
      .needs_position = true,
      .needs_travel = "how far from the string the finger rests",
-     .extent = Extent::travel,
-     .is_sweep = true,
      .start = [](const Stroke& control) { return control.middle - control.settings.travel; },
      .play =
          [](InputDriver& driver, Stroke& stroke) {
@@ -145,7 +133,6 @@ inline constexpr GestureRow gestures[] = {
      .name = "bow",
      .does = "a bow moves at a speed from `range` while the key is held",
      .needs_position = true,
-     .extent = Extent::endless,
      .play =
          [](InputDriver& driver, Stroke& stroke) {
            // Friction has no scale: if bow speed and output level grow together, the motion keeps

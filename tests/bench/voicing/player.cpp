@@ -65,7 +65,7 @@ void Player::reset() {
   }
   for (const ControlSetting& control : scene_.preset.controls) {
     if (control.source == ControlSource::controller &&
-        row_of(control.gesture).extent == Extent::range) {
+        control.gesture != Gesture::pluck && control.gesture != Gesture::bow) {
       events.push_back({0.0, turn(control.number, 0.0)});
     }
   }
