@@ -64,8 +64,8 @@ void Player::reset() {
     events.push_back({0.0, turn(pedal, 0.0)});
   }
   for (const ControlSetting& control : scene_.preset.controls) {
-    if (control.source == ControlSource::controller &&
-        control.gesture != Gesture::pluck && control.gesture != Gesture::bow) {
+    if (control.source == ControlSource::controller && control.gesture != Gesture::pluck &&
+        control.gesture != Gesture::bow) {
       events.push_back({0.0, turn(control.number, 0.0)});
     }
   }
