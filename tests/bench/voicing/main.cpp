@@ -3,6 +3,7 @@
 //  ressort_voicing [--keys STEP] [PRESET...]           one row each, ! after values out of bounds
 //  ressort_voicing --random N [--seed S] [PRESET...]   N random settings of all controls for each
 //  ressort_voicing --bows N [PRESET...]                bows: N speeds and N pressures, 24 keys
+//  ressort_voicing --played N [PRESET...]              processor time as played, median of N
 //  ressort_voicing --restrikes KEY [PRESET...]         level of a ringing note after a soft strike
 //  ressort_voicing --tuner RATE [PRESET...]            pitch of every semitone by YIN
 //  ressort_voicing [--seconds S] FILE.mid... [PRESET...]
@@ -27,6 +28,7 @@
 #include "app/session/files.h"
 #include "core/engine/limiter.h"
 #include "tests/bench/voicing/midi_files.h"
+#include "tests/bench/voicing/played.h"
 #include "tests/bench/voicing/player.h"
 #include "tests/bench/voicing/random_settings.h"
 #include "tests/bench/voicing/restrikes.h"
@@ -332,6 +334,7 @@ int run(int argc, char** argv) {
   int random = 0;
   int bows = 0;
   int restrikes = 0;
+  int played = 0;
   double tuner_hz = 0.0;
   std::uint64_t seed = 1;
   for (int i = 1; i < argc; ++i) {
@@ -348,6 +351,8 @@ int run(int argc, char** argv) {
       bows = std::max(1, std::atoi(argv[++i]));
     } else if (word == "--restrikes") {
       restrikes = std::atoi(argv[++i]);
+    } else if (word == "--played") {
+      played = std::max(1, std::atoi(argv[++i]));
     } else if (word == "--tuner") {
       tuner_hz = std::atof(argv[++i]);
     } else if (word == "--seconds") {
@@ -366,6 +371,9 @@ int run(int argc, char** argv) {
              "ElectricGuitar", "BassGuitar", "Violin",      "Vibraphone",  "Marimba"};
   } else if (names.empty()) {
     names = known_presets();
+  }
+  if (played > 0) {
+    return print_played(names, played) == 0 ? 0 : 1;
   }
   if (!files.empty()) {
     print_midi_head();

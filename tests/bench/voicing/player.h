@@ -32,8 +32,10 @@ class Player {
   // sorted by time.
   Stereo play(const std::vector<TimedEvent>& events, double seconds);
   Stereo continue_playing(double seconds);  // Continues with the voices that sound.
-  // Returns the share of one core that a number of voices, each with a note, and the bodies take
-  // in the first seconds of these notes.
+  // Returns the processor time of these events, played from silence, as a share of one core.
+  double processor_share(const std::vector<TimedEvent>& events, double seconds);
+  // Returns the least such share of a number of voices, each with a note, and the bodies in the
+  // first seconds of these notes.
   double real_time_share(double seconds, int voices);
 
   const Scene& scene() const { return scene_; }

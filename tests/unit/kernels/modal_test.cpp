@@ -189,8 +189,9 @@ TEST_CASE("A strike acts on distant links within its block", "[modal]") {
 }
 
 TEST_CASE("A hammer drifts away from a string and returns", "[modal]") {
-  // The hammer's mode is soft (lK = 1e-6, 2 pi 1000 samples a period), so between two blows it flies
-  // much further than the string moves. The forces of springs and dampers are heard meanwhile.
+  // The hammer's mode is soft (lK = 1e-6, 2 pi 1000 samples a period), so between two blows it
+  // flies much further than the string moves. The forces of springs and dampers are heard
+  // meanwhile.
   const Program program = modal_program(
       scenes::string("s", 20, "0.1", "0.01") + "@g ground 0.05\n@h mass s_M 0.05 0.\n" +
       "@back spring @g @h 1e-6\n@in1 frcInput @h\n@blow contact @h @s_m7 0.05 0.001 0.\n" +
@@ -198,8 +199,8 @@ TEST_CASE("A hammer drifts away from a string and returns", "[modal]") {
   for (const std::uint64_t seed : {1u, 2u, 3u}) {
     for (const Isa isa : isas()) {
       check_same<double>(
-          program,
-          {.frames = 12000, .seed = seed, .reach = 1e-7, .highest_hz = 10.0, .isa = isa}, 1e-9);
+          program, {.frames = 12000, .seed = seed, .reach = 1e-7, .highest_hz = 10.0, .isa = isa},
+          1e-9);
     }
   }
 }
