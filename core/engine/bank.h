@@ -136,6 +136,7 @@ struct Bank : BlockBuffers<T> {
                                           .value = this->value.data(),
                                           .velocity = this->velocity.data(),
                                           .is_common = is_common,
+                                          .is_still = filled_part == &parts[p],
                                           .audio = this->audio.data(),
                                           .outputs = this->outputs.data(),
                                           .lanes = group.end - group.first});

@@ -71,9 +71,12 @@ template <class T>
 void OutputLevels::apply(Bank<T>& bank, const VoiceGroup& group, std::size_t frames) const {
   const PartBank<T>& part = bank.parts[group.part];
   for (const Level& level : parts_[group.part]) {
-    for (std::size_t n = 0; n < frames; ++n) {
-      const T factor = static_cast<T>(level.after(n + 1));
-      T* const row = bank.outputs.data() + n * part.row() + level.output * part.width;
+    if (level.frames == 0 && level.target == 1.0) {
+      continue;
+    }
+    T* row = bank.outputs.data() + level.output * part.width;
+    for (std::size_t n = 0; n < frames; ++n, row += part.row()) {
+      const T factor = static_cast<T>(level.frames == 0 ? level.target : level.after(n + 1));
       for (std::size_t lane = 0; lane < part.width; ++lane) {
         row[lane] *= factor;
       }

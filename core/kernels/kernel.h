@@ -23,6 +23,7 @@ struct Block {
   const T* value = nullptr;     // [frame][input][lane] position, or force
   const T* velocity = nullptr;  // [frame][input][lane] of a position, per sample
   bool is_common = false;       // both are [frame][input], for all lanes
+  bool is_still = false;        // all frames have the values of the first
   const T* audio = nullptr;     // [frame][audio coefficient][lane]
   T* outputs = nullptr;         // [frame][output][lane]
   // Lanes from this number on have no voice; the kernel may skip them.

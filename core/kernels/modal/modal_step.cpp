@@ -96,7 +96,8 @@ struct ModalPlayer {
   bool has_quiet_inputs(std::size_t first, std::size_t frames) const {
     const T* const value = block.value + first * inputs;
     return s.inputs.are_forces &&
-           std::none_of(value, value + frames * inputs, [](T x) { return x != 0; });
+           std::none_of(value, value + (block.is_still ? 1 : frames) * inputs,
+                        [](T x) { return x != 0; });
   }
 
   // Computes the amplitude of each push in a sample.
