@@ -64,19 +64,20 @@ TEST_CASE("shipped instruments sound within a cent of their keys' pitch", "[hear
   }
 }
 
-// All presets that are tuned by keys and ring at small amplitudes.
+// All presets that are tuned by keys and ring at small amplitudes, except those whose partials are
+// pairs of modes that beat (Harp, Piano): the tuner measures these.
 TEST_CASE("all instruments sound in tune over the keyboard at three rates",
           "[.][heard_pitch_everywhere]") {
   for (const double rate_hz : {44100.0, 48000.0, 96000.0}) {
-    for (const char* const name : {"1000massString", "20x30mesh",        "BarMetals",
-                                   "BassGuitar",     "BellPlate",        "BellThirds",
-                                   "Bourdon",        "Celesta",          "ChurchBell",
-                                   "ElectricGuitar", "Glockenspiel",     "Gong",
-                                   "Guitar",         "HandBell",         "Harp",
-                                   "Harpsichord",    "IPlayTheTriangle", "LargeTriangleMesh",
-                                   "MajorBell",      "Marimba",          "MarimbaTube",
-                                   "PluckedHarmonics", "PolyTriangle",   "Resonator",
-                                   "SixStructures",  "SteelDrum",        "Vibraphone"}) {
+    for (const char* const name : {"1000massString",   "20x30mesh",         "BarMetals",
+                                   "BassGuitar",       "BellPlate",         "BellThirds",
+                                   "Bourdon",          "Celesta",           "ChurchBell",
+                                   "ElectricGuitar",   "Glockenspiel",      "Gong",
+                                   "Guitar",           "HandBell",          "Harpsichord",
+                                   "IPlayTheTriangle", "LargeTriangleMesh", "MajorBell",
+                                   "Marimba",          "MarimbaTube",       "PluckedHarmonics",
+                                   "PolyTriangle",     "Resonator",         "SixStructures",
+                                   "SteelDrum",        "Vibraphone"}) {
       check_keys(name, rate_hz, {36, 45, 57, 69, 81, 93});
     }
   }
