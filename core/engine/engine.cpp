@@ -69,7 +69,7 @@ struct Engine::Player {
         audio(machine, playing, std::visit([](const auto& b) { return b.mixer.is_silent; }, bank)),
         watch(machine, playing, voices.size()),
         levels(machine, playing),
-        mixing(playing),
+        mixing(playing, machine.rate_hz, keyboard.voices.size()),
         share(playing.share),
         viewer(machine.rate_hz) {
     keyboard.wake(0);
@@ -414,6 +414,9 @@ struct Engine::Player {
     b.step(segment.frames, voices.awake_end(), drive, mix);
     levels.advance(segment.frames);
     voices.advance_gains(segment.frames);
+    if (voices.is_comparing()) {
+      mixing.compare(segment.frames, voices, [&](Voice& voice) { keyboard.invert(voice); });
+    }
     since_update += segment.frames;
     if (since_update == max_block_frames) {
       since_update = 0;

@@ -1,5 +1,6 @@
 #include "core/engine/keyboard.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 
@@ -22,11 +23,6 @@ Keyboard::Keyboard(const Playing& playing, double rate_hz, std::size_t outputs)
     : voices(playing, rate_hz),
       playing_(playing),
       rate_hz_(rate_hz),
-      restrikes_(std::none_of(playing.controls.begin(), playing.controls.end(),
-                              [](const Control& control) {
-                                return control.source == Source::note &&
-                                       (control.settings.has_level || control.throws);
-                              })),
       rings_on_(std::none_of(playing.controls.begin(), playing.controls.end(),
                              [](const Control& control) {
                                return control.source == Source::note &&
@@ -108,24 +104,23 @@ Press Keyboard::press_key(int key, double velocity, std::uint8_t channel, double
   if (mono != nullptr && mono->held) {
     replace(*mono);
   }
-  if (!is_fixed && !restrikes_) {
-    replace_voices_of(key, channel, velocity);
-  }
+  const Voice* const kept = is_fixed ? nullptr : replace_voices_of(key, channel, velocity);
   Voice& latest = voices[voices.latest()];
   const bool stays = is_fixed && !latest.fading && latest.is_undamped();
-  Voice& voice = stays ? latest : voice_for(key, channel);
+  Voice& voice = stays ? latest : voices.take_lane();
   voices.set_latest(voice);
-  const bool starts = is_fixed ? !voice.is_live() : !is_restruck(voice, key, channel);
+  const bool starts = !is_fixed || !voice.is_live();
   if (starts) {
     voices.start(voices.latest(), hz, channels_.semitones(0));
     voice.key_hz = note_hz;
     voice.has_own_pitch = own_hz > 0.0;
+    if (kept != nullptr && kept != &voice) {
+      voices.compare(voice, *kept);
+    }
   }
   attach(voice, key, channel);
   if (starts) {
     voice.volume = level_of(voice);
-  } else if (!is_fixed) {
-    move_to(voice, key, own_hz, false, highest_factor);
   }
   double& before_hz = last_hz_[channel % Channels::count];
   if (starts && glides && before_hz > 0.0 && !is_fixed) {
@@ -159,24 +154,6 @@ void Keyboard::hold(Voice& voice) const {
   damp(voice);
 }
 
-// Returns the voice that already sounds this key, or a lane for a new one.
-Voice& Keyboard::voice_for(int key, std::uint8_t channel) {
-  for (Voice& voice : voices) {
-    if (is_restruck(voice, key, channel)) {
-      return voice;
-    }
-  }
-  return voices.take_lane();
-}
-
-// A repeated key strikes this voice again. A damped voice is left to ring out beside a new one, and
-// so is a voice whose level depends on how hard its key was pressed, and one whose hammer has flown
-// away: a second blow would add to its speed, and the hammer would come back too late and too fast.
-bool Keyboard::is_restruck(const Voice& voice, int key, std::uint8_t channel) const {
-  return restrikes_ && voice.is_live() && voice.is_undamped() && voice.has_key &&
-         voice.key == key && voice.channel == channel;
-}
-
 Voice* Keyboard::latest_on(std::uint8_t channel) {
   return voices.least_of(
       [&](const Voice& voice) {
@@ -208,9 +185,8 @@ bool Keyboard::release_key(Voice& voice, int key, std::uint8_t channel, double v
   voice.held = false;
   voice.is_released = true;
   voice.release_velocity = velocity;
-  voice.release_s =
-      playing_.damper_on(voice.key) *
-      std::pow(release_range, 2.0 * (usual_release_velocity - velocity));
+  voice.release_s = playing_.damper_on(voice.key) *
+                    std::pow(release_range, 2.0 * (usual_release_velocity - velocity));
   voice.sustained = voice.latched || channels_.sustains(channel);
   damp(voice);
   return !voice.sustained;
@@ -225,15 +201,17 @@ void Keyboard::release(Voice& voice) const {
 void Keyboard::replace(Voice& voice) const {
   voice.held = voice.sustained = voice.latched = false;
   voice.is_released = voice.is_replaced = true;
-  voice.release_s = replaced_s;
+  const bool is_damped = voice.decay.kept_goal < 1.0;
+  voice.release_s = is_damped ? std::min(voice.release_s, replaced_s) : replaced_s;
   damp(voice);
 }
 
 // A repeated key damps its earlier voices, as a finger or hammer touches the same string. But a
 // softer strike must not silence a string that rings: the loudest voice rings on beside the new
 // one, and both end with the key. A voice that is bowed or held ends in any case, because its key
-// begins a new stroke.
-void Keyboard::replace_voices_of(int key, std::uint8_t channel, double velocity) {
+// begins a new stroke. A new voice has a new hammer: a second blow on one that has flown away would
+// add to its speed. Returns the voice that rings on, or null.
+const Voice* Keyboard::replace_voices_of(int key, std::uint8_t channel, double velocity) {
   const auto is_earlier = [&](const Voice& voice) {
     return voice.is_live() && voice.has_key && !voice.is_replaced && voice.key == key &&
            voice.channel == channel;
@@ -250,6 +228,12 @@ void Keyboard::replace_voices_of(int key, std::uint8_t channel, double velocity)
       replace(voice);
     }
   }
+  return kept;
+}
+
+void Keyboard::invert(Voice& voice) const {
+  voice.strength = -voice.strength;
+  voices.ramp_volume(voice, level_of(voice));
 }
 
 void Keyboard::damp_keyless(Voice& voice) const {

@@ -112,6 +112,8 @@ class Keyboard {
   void vibrate(Voice& voice, double semitones, double gain);
   // Sets a voice's gain by velocity: at once if it starts, else within 20 ms.
   void set_strength(Voice& voice, double strength) const;
+  // Ramps the voice's output to its negative.
+  void invert(Voice& voice) const;
 
   // --- addressing ---
   // Returns whether the voice is awake and in the scope. A released note of an MPE member channel
@@ -135,11 +137,9 @@ class Keyboard {
 
  private:
   void attach(Voice& voice, int key, std::uint8_t channel);
-  bool is_restruck(const Voice& voice, int key, std::uint8_t channel) const;
-  Voice& voice_for(int key, std::uint8_t channel);
   Voice* latest_on(std::uint8_t channel);
   void hold(Voice& voice) const;
-  void replace_voices_of(int key, std::uint8_t channel, double velocity);
+  const Voice* replace_voices_of(int key, std::uint8_t channel, double velocity);
   void replace(Voice& voice) const;
   void move_to(Voice& voice, int key, double own_hz, bool glides, double highest_factor);
   void glide_from(Voice& voice, double frequency_hz) const;
@@ -153,7 +153,6 @@ class Keyboard {
 
   const Playing& playing_;
   double rate_hz_;
-  bool restrikes_;  // a repeated key strikes its sounding voice again
   bool rings_on_;   // a louder voice rings on beside a repeated key's new one
   bool is_stereo_;
   Channels channels_;

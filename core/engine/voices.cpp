@@ -15,11 +15,16 @@ constexpr double volume_ramp_s = 0.02;
 constexpr double damper_on_s = 0.005;    // time constant with which a damper engages
 constexpr double inaudible_gain = 1e-6;  // a damped voice below this gain ends
 
-// The order of stealing: released voices first, then quieter ones.
+// The order of stealing: silent voices, then those that another has replaced, released ones, and
+// those that are held; quieter ones first.
 bool is_stolen_before(const Voice& a, const Voice& b) {
-  const bool a_is_up = !a.held && !a.sustained;
-  const bool b_is_up = !b.held && !b.sustained;
-  return a_is_up != b_is_up ? a_is_up : a.level < b.level;
+  const auto rank = [](const Voice& voice) {
+    return voice.held || voice.sustained ? 3
+           : voice.level <= quiet_level  ? 0
+           : voice.is_replaced           ? 1
+                                         : 2;
+  };
+  return rank(a) != rank(b) ? rank(a) < rank(b) : a.level < b.level;
 }
 
 }  // namespace
@@ -35,6 +40,9 @@ Voices::Voices(const Playing& playing, double rate_hz)
 
 void Voices::continue_from(const Voices& from) {
   voices_ = from.voices_;
+  for (Voice& voice : voices_) {
+    voice.beside = nullptr;
+  }
   if (swings_.size() == from.swings_.size()) {
     swings_ = from.swings_;
   }
@@ -128,7 +136,7 @@ void Voices::limit(std::size_t most) {
   };
   for (std::size_t left = count_excess(0); left > 0; --left) {
     Voice& least = *least_of(may_end, is_stolen_before);
-    shed_ += least.level > quiet_level ? 1 : 0;
+    shed_ += least.level > quiet_level && !least.is_replaced ? 1 : 0;
     fade(least);
   }
 }
@@ -137,7 +145,7 @@ Voice& Voices::take_lane() {
   if (count_excess(1) > 0) {
     Voice& quietest =
         *least_of([](const Voice& voice) { return voice.is_live(); }, is_stolen_before);
-    stolen_ += quietest.level > quiet_level ? 1 : 0;
+    stolen_ += quietest.level > quiet_level && !quietest.is_replaced ? 1 : 0;
     fade(quietest);
   }
   // A reserve lane is free unless several voices were stolen within one fade. Then the voice that
@@ -210,7 +218,7 @@ void Voices::advance_gains(std::size_t frames) {
 bool Voices::update(Voice& voice) {
   voice.decay.finish_approach();
   const double peak = voice.peak * playing_.heard_gain() * voice.decay.gain *
-                      std::max(voice.volume[0], voice.volume[1]);
+                      std::max(std::fabs(voice.volume[0]), std::fabs(voice.volume[1]));
   voice.peak = 0.0;
   voice.level = std::max(peak, voice.level * level_kept_);
   const double gain = voice.decay.gain;

@@ -78,17 +78,20 @@ struct alignas(64) Voice {
   double velocity = 0.0;          // velocity of its last strike, 0..1, after the preset's curve
   double level = 0.0;             // output peak with a slow release
   std::size_t quiet_frames = 0;
-  std::size_t quiet_spans = 0;  // of 0.5 s, since its last sound
-  std::uint64_t turn = 0;     // serial number of its key press
-  double frequency_hz = 0.0;  // without bend; 0: as the model is written
-  double key_hz = 0.0;        // requested frequency, before the stability limit
-  double semitones = 0.0;     // its own channel's bend and tuning
-  double vibrato = 0.0;       // semitones by LFOs
-  double tremolo = 1.0;       // gain by LFOs
-  double glide = 0.0;         // semitones left of the glide
-  double glide_step = 0.0;    // semitones per max_block_frames
-  double factor = 1.0;        // factor on every stiffness
-  double release_s = 0.0;     // T60 of its damper, by release velocity
+  std::size_t quiet_spans = 0;    // of 0.5 s, since its last sound
+  std::uint64_t turn = 0;         // serial number of its key press
+  const Voice* beside = nullptr;  // earlier voice of its key, with which it is compared
+  std::size_t compared_frames = 0;
+  double agreement = 0.0;         // sum of products of both outputs
+  double frequency_hz = 0.0;      // without bend; 0: as the model is written
+  double key_hz = 0.0;            // requested frequency, before the stability limit
+  double semitones = 0.0;         // its own channel's bend and tuning
+  double vibrato = 0.0;           // semitones by LFOs
+  double tremolo = 1.0;           // gain by LFOs
+  double glide = 0.0;             // semitones left of the glide
+  double glide_step = 0.0;        // semitones per max_block_frames
+  double factor = 1.0;            // factor on every stiffness
+  double release_s = 0.0;         // T60 of its damper, by release velocity
   double release_velocity = 0.0;  // 0..1
 };
 
@@ -156,6 +159,13 @@ class Voices {
   void ramp_volume(Voice& voice, const SideGains& level) const;
   // Ramps it within one block, or to the end of the current ramp.
   void follow_volume(Voice& voice, const SideGains& level) const;
+  // Compares a new voice with an earlier one of its key from now on; see Mixing::compare().
+  void compare(Voice& voice, const Voice& earlier) {
+    voice.beside = &earlier;
+    is_comparing_ = true;
+  }
+  bool is_comparing() const { return is_comparing_; }
+  void set_comparing(bool is_comparing) { is_comparing_ = is_comparing; }
   // Fades the voice out within 5 ms, as a stolen voice.
   void fade(Voice& voice) const;
   void limit(std::size_t most);
@@ -208,6 +218,7 @@ class Voices {
   std::size_t awake_ = 0;
   std::size_t latest_ = 0;
   bool has_changed_ = false;
+  bool is_comparing_ = false;  // some voice is compared
   std::size_t limit_ = std::numeric_limits<std::size_t>::max();
   std::uint64_t resets_ = 0;
   std::uint64_t stolen_ = 0;
