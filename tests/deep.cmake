@@ -59,7 +59,8 @@ add_deep_test(export_all 60 ${CMAKE_COMMAND} -E env RESSORT_THOROUGH=1
   $<TARGET_FILE:ressort_export_tests>)
 
 # A soft strike on a ringing note of each preset.
-add_deep_test(restrikes_all 30 $<TARGET_FILE:ressort_voicing> --restrikes 60)
+add_deep_test(restrikes_all 30 $<TARGET_FILE:ressort_voicing> --restrikes 60
+  ${ressort_all_restruck})
 
 # The complete version of a test that the first tier shortens.
 add_deep_test(command_line_all 90 ${CMAKE_COMMAND} -E env RESSORT_THOROUGH=1

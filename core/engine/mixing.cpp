@@ -8,7 +8,7 @@
 namespace ressort::engine {
 namespace {
 
-constexpr double compared_s = 0.015;
+constexpr double compared_s = 0.01;
 
 }  // namespace
 

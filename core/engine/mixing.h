@@ -25,7 +25,7 @@ class Mixing {
   void add(Bank<T>& bank, const VoiceGroup& group, const Segment& segment, Voices& voices,
            EnergyWatch& watch);
   // Calls invert(voice) for a new voice that takes from the sound of an earlier voice of its key:
-  // the sum of the products of both, over the first 15 ms of its sound, is negative. Two waves of
+  // the sum of the products of both, over the first 10 ms of its sound, is negative. Two waves of
   // one pitch add up or cancel by chance; the sign of the softer one is free. Called after all
   // kernels have been mixed.
   template <class Invert>
