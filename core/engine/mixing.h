@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -68,9 +69,11 @@ void Mixing::compare(std::size_t frames, Voices& voices, Invert&& invert) {
     }
     const double* const mine = rows_.data() + voices.lane_of(voice) * max_block_frames;
     const double* const other = rows_.data() + voices.lane_of(*voice.beside) * max_block_frames;
+    const double gain = gain_ * std::fabs(voice.strength);
     for (std::size_t n = 0; n < frames; ++n) {
       voice.agreement += mine[n] * other[n];
-      voice.compared_frames += mine[n] != 0.0 ? 1 : 0;
+      voice.compared_frames +=
+          voice.compared_frames > 0 || gain * std::fabs(mine[n]) > quiet_level ? 1 : 0;
     }
     const bool is_certain = voice.compared_frames >= least_compared_;
     if (is_certain && voice.agreement < 0.0) {
