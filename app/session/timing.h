@@ -17,8 +17,8 @@ double cpu_time_ns(const Program& program, const std::function<void()>& play);
 void measure(Plan& plan, const Engine& engine, const CompileOptions& options, int voices,
              const Timings& timings);
 
-// Returns a warning if one core is too slow for all voices with all contacts closed, by the
-// measured cost if it is known; empty if it is fast enough. [any thread but audio]
+// Returns a warning if one core is too slow for all voices as they are played, by the measured
+// cost if it is known; empty if it is fast enough. [any thread but audio]
 std::string overload_warning(const Plan& plan, int voices, double rate_hz, Precision precision);
 
 // Returns ways to lower the load: "-p 3, a lower rate, ...". `voices`: how many fit; 0: none.

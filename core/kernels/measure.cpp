@@ -22,7 +22,8 @@ constexpr double enough_ns = 3e6;  // measuring time for all blocks of one form
 // steps of all voices in a sample; larger parts are not measured
 constexpr double most_steps = 1e6;
 
-// A part in one form, with the state and the input of its worst case.
+// A part in one form, while it is played: modes ring, contacts touch, and no input moves. A mass
+// that nothing holds, such as a hammer, touches for moments only, so its contacts stay open.
 template <class T>
 class Trial {
  public:
@@ -67,8 +68,21 @@ class Trial {
       kernel->step({.frames = max_block_frames,
                     .value = value_.data(),
                     .velocity = velocity_.data(),
+                    .is_still = !is_pushed_,
                     .audio = audio_.data(),
                     .outputs = outputs_.data()});
+    }
+  }
+
+  // Ends the push of the first block.
+  void let_go() {
+    is_pushed_ = false;
+    const std::size_t count = program_.inputs.size();
+    const std::size_t width = count == 0 ? 1 : value_.size() / count / max_block_frames;
+    for (std::size_t i = 0; i < value_.size(); ++i) {
+      if (program_.inputs[i / width % count].is_force) {
+        value_[i] = T(0);
+      }
     }
   }
 
@@ -85,6 +99,7 @@ class Trial {
   // Moves one end of each open contact, pluck and the like to a quarter of its reach from the other
   // end: a position input if the link has one, else a mass.
   void close_gaps() {
+    const std::vector<bool> is_held = held_nodes();
     for (const LinkRun& run : program_.link_runs) {
       const LawFacts& law = facts_of(run.law);
       if (!law.can_detach()) {
@@ -98,7 +113,8 @@ class Trial {
       const double inside = law.zone == Zone::near ? 0.25 * reach : least_overlap;
       for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
         const auto [a, b] = program_.ends[i];
-        if (law.gap(numbers, x_[a] - x_[b]) < 0.0) {
+        const bool is_thrown = (is_mass(a) && !is_held[a]) || (is_mass(b) && !is_held[b]);
+        if (is_thrown || law.gap(numbers, x_[a] - x_[b]) < 0.0) {
           continue;
         }
         has_closed_ = true;
@@ -111,7 +127,24 @@ class Trial {
     }
   }
 
-  // Position inputs stay where they touch. Force inputs are noise, so that all modes ring.
+  // Returns which nodes something holds or pulls back.
+  std::vector<bool> held_nodes() const {
+    std::vector<bool> is_held(program_.position.size());
+    for (const MassRun& run : program_.mass_runs) {
+      std::fill_n(is_held.begin() + run.first, run.count, run.is_oscillator || run.has_gravity);
+    }
+    for (const LinkRun& run : program_.link_runs) {
+      for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
+        if (!facts_of(run.law).can_detach()) {
+          is_held[program_.ends[i].a] = is_held[program_.ends[i].b] = true;
+        }
+      }
+    }
+    return is_held;
+  }
+
+  // Position inputs stay where they touch. Force inputs are noise in the first block, so that all
+  // modes ring.
   void set_inputs(std::size_t width) {
     value_.resize(max_block_frames * width * program_.inputs.size());
     velocity_.resize(value_.size());
@@ -142,6 +175,7 @@ class Trial {
   Aligned<T> outputs_;
   bool has_started_ = false;
   bool has_closed_ = false;
+  bool is_pushed_ = true;
 };
 
 template <class T>
@@ -152,6 +186,7 @@ double measured_ns(const Program& program, const Workload& load, const Timings& 
     return timings.time(program, [&] { trial.play(); });
   };
   block_ns();
+  trial.let_go();
   std::vector<double> took;
   for (double sum = 0.0;
        took.size() < most_blocks && (took.size() < least_blocks || sum < enough_ns);) {
@@ -220,7 +255,7 @@ std::string form_name(const Form& form) {
 
 std::string timing_key(const Program& program, const Workload& load) {
   std::array<char, 96> rest{};
-  std::snprintf(rest.data(), rest.size(), "; %016llx; %d voices, %s, %s, %.0f Hz",
+  std::snprintf(rest.data(), rest.size(), "; held %016llx; %d voices, %s, %s, %.0f Hz",
                 static_cast<unsigned long long>(structure_of(program)), load.voices,
                 load.is_double ? "double" : "float", std::string(isa_name(load.isa)).c_str(),
                 program.rate_hz);
