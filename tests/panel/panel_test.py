@@ -149,7 +149,11 @@ def doors(program):
 
 
 def silence(program, browser):
+    # The status may be older than the panic, whose fade would take the next strike with it. Each frame
+    # shows a later sample.
+    shown = browser.evaluate("panel.frames")
     program.osc("/panic")
+    browser.eventually(f"panel.frames > {shown} + 4")
     return browser.eventually("(panel.status.peak_db ?? -999) < -80 && panel.status.voices === 0")
 
 
