@@ -48,7 +48,7 @@ struct VoiceCurve {
   double on_key(double key, double knob) const { return limited(unlimited(key, knob)); }
   double at(double key, double velocity_of_note, double knob) const {
     const double value = unlimited(key, knob);
-    return velocity.empty()   ? limited(value)
+    return velocity.empty() ? limited(value)
            : is_by_ratios() ? limited(value * value_at(velocity, velocity_of_note))
                             : limited(value + value_at(velocity, velocity_of_note));
   }

@@ -73,8 +73,7 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
   command->add_option("-p,--voices", options.voices, "number of voices (default: the preset's)")
       ->check(within(1, max_voices));
   add_keys(*command, options.keys);
-  command
-      ->add_option("--threads", options.threads, "threads for voices (default: all cores)")
+  command->add_option("--threads", options.threads, "threads for voices (default: all cores)")
       ->check(within(1, 1024));
   command->add_flag("--limit", options.limit, "limit peaks to full scale; adds 1 ms of latency");
   command->add_flag("--all-presets", choice.all_presets,

@@ -31,9 +31,8 @@ double cpu_time_ns(const Program&, const std::function<void()>& play) {
 void measure(Plan& plan, const Engine& engine, const CompileOptions& options, int voices,
              const Timings& timings) {
   auto part = plan.parts.begin();
-  const Workload load{.is_double = options.precision == Precision::float64,
-                      .isa = options.isa,
-                      .voices = voices};
+  const Workload load{
+      .is_double = options.precision == Precision::float64, .isa = options.isa, .voices = voices};
   for (const Program& program : engine.machine().parts) {
     if (program.moving > 0 && part != plan.parts.end()) {
       part->measured_ns = known_ns(program, load, timings).value_or(0.0);

@@ -391,9 +391,7 @@ std::optional<Continuous> solve_continuous(const Network& network,
   const ContinuousBody body(network, parameters);
   if (!is_linear(network) || !body.has_mass() || body.size() > most_exact_modes ||
       std::any_of(network.outputs.begin(), network.outputs.end(),
-                  [](const Output& output) {
-                    return output.is_force || output.derivative > 0;
-                  })) {
+                  [](const Output& output) { return output.is_force || output.derivative > 0; })) {
     return std::nullopt;
   }
   return Solver(network, body).solve();

@@ -40,8 +40,7 @@ std::string described(const Culprit& culprit) {
 }  // namespace
 
 // Finds a mass that is not above 0, or an argument that is not finite.
-std::optional<Proofs::Suspect> Proofs::find_invalid_number_in(
-    std::span<const Range> arguments) {
+std::optional<Proofs::Suspect> Proofs::find_invalid_number_in(std::span<const Range> arguments) {
   for (std::size_t row = 0; row < assembly_.masses.size(); ++row) {
     const Range mass = range_at(arguments, network_.masses[assembly_.masses[row]].mass);
     if (!(mass.lowest > 0.0 && std::isfinite(mass.highest))) {

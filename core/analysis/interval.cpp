@@ -217,23 +217,22 @@ Trend trend_of(Op op, const Trended& x, const Trended& y) {
 
 // Returns whether the formula only rises or only falls with the parameter, anywhere in the box.
 bool is_monotone(std::span<const Step> formula, const ParameterBox& box, std::uint32_t parameter) {
-  const Trend trend =
-      run<Trended>(
-          formula,
-          [](double value) {
-            return Trended{{value, value}, Trend::none};
-          },
-          [&](std::uint32_t index) {
-            return Trended{{box.lowest[index], box.highest[index]},
-                           index == parameter ? Trend::rising : Trend::none};
-          },
-          [](Op op, const Trended& x) {
-            return Trended{apply(op, x.range), trend_of(op, x)};
-          },
-          [](Op op, const Trended& x, const Trended& y) {
-            return Trended{apply(op, x.range, y.range), trend_of(op, x, y)};
-          })
-          .trend;
+  const Trend trend = run<Trended>(
+                          formula,
+                          [](double value) {
+                            return Trended{{value, value}, Trend::none};
+                          },
+                          [&](std::uint32_t index) {
+                            return Trended{{box.lowest[index], box.highest[index]},
+                                           index == parameter ? Trend::rising : Trend::none};
+                          },
+                          [](Op op, const Trended& x) {
+                            return Trended{apply(op, x.range), trend_of(op, x)};
+                          },
+                          [](Op op, const Trended& x, const Trended& y) {
+                            return Trended{apply(op, x.range, y.range), trend_of(op, x, y)};
+                          })
+                          .trend;
   return trend != Trend::unknown;
 }
 

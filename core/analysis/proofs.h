@@ -46,7 +46,8 @@ class Proofs {
     std::vector<Range> arguments;  // [argument]
     std::vector<Load> loads;       // [term]
   };
-  using LoadOfTerm = Load (*)(const Network&, const Assembly::Term&, std::span<const Range>, double);
+  using LoadOfTerm = Load (*)(const Network&, const Assembly::Term&, std::span<const Range>,
+                              double);
 
   std::span<const Range> ranges(const ParameterBox& box);
   std::span<const Load> loads(std::span<const Range> arguments) {

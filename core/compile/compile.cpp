@@ -234,8 +234,8 @@ Result<Compiled> compile_by_stages(const CompileRequest& request) {
   std::vector<std::string> notes =
       make_notes(request, reduced, schemes, culled, proof, keys, !factor, bows);
   progress.stage("making its voices");
-  Instrument instrument = make_instrument(network, preset, proof, keys, request.voices,
-                                          voice_gain * body_gain.mean);
+  Instrument instrument =
+      make_instrument(network, preset, proof, keys, request.voices, voice_gain * body_gain.mean);
   instrument.gain = gain;
   instrument.struck = find_struck(request.written, planned.machine);
   std::optional<Accuracy> accuracy = accuracy_of(planned.parts);

@@ -54,11 +54,11 @@ Control make_control(const Network& network, const ControlSetting& setting) {
   control.turns = static_cast<std::uint8_t>(setting.turns);
   control.settings = settings_of(setting);
   if (control.source == Source::lfo) {
-    control.target = setting.target == "pitch"   ? Control::pitch
-                     : setting.target == "level" ? Control::level
-                                                 : static_cast<std::uint16_t>(
-                                                       Control::first_parameter +
-                                                       find_parameter(network, setting.target));
+    control.target = setting.target == "pitch" ? Control::pitch
+                     : setting.target == "level"
+                         ? Control::level
+                         : static_cast<std::uint16_t>(Control::first_parameter +
+                                                      find_parameter(network, setting.target));
     return control;
   }
   for (const double key : curve_keys(setting)) {

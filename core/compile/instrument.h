@@ -77,8 +77,8 @@ Preset in_positions(Preset preset, const Network& network, double swing);
 KeyFrequencies key_frequencies(const Preset& preset);
 
 // Returns the curves of the parameters whose values differ from voice to voice, [parameter], within
-// the proved ranges. The curve of a parameter that only an LFO moves is constant. Empty if there are
-// none. [any thread but audio]
+// the proved ranges. The curve of a parameter that only an LFO moves is constant. Empty if there
+// are none. [any thread but audio]
 std::vector<std::optional<VoiceCurve>> voice_curves(const Network& network, const Preset& preset,
                                                     const StabilityCheck& stability);
 

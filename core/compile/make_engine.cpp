@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "core/engine/voices.h"
-#include "core/kernels/threads/executor.h"
 #include "core/kernels/passive/clusters.h"
 #include "core/kernels/registry.h"
+#include "core/kernels/threads/executor.h"
 
 namespace ressort::compile {
 namespace {

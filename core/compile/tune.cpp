@@ -138,8 +138,7 @@ std::vector<Pitches> find_key_pitches(const CompileRequest& request, const Netwo
   }
   request.options.progress.stage("tuning each key at its own parameters");
   const KeyFrequencies keys_hz = key_frequencies(request.preset);
-  const KeyFrequencies usual_hz =
-      equal_temperament(request.preset.a4_hz, request.preset.transpose);
+  const KeyFrequencies usual_hz = equal_temperament(request.preset.a4_hz, request.preset.transpose);
   std::vector<Pitches> keys;
   std::optional<LowestShapes> shapes;
   std::vector<double> before;
@@ -187,8 +186,8 @@ TunedKeys tune(const CompileRequest& request, const Network& network, const Anal
   keys.mode = analysis.mode();
   keys.mode->frequency_hz = keys.pitches.frequency_at(1.0);
   keys.along = find_pitches_along(request, network, planned.machine);
-  keys.by_key = find_key_pitches(request, network, planned.machine, *analysis.shapes,
-                                 found.pitches, curves);
+  keys.by_key =
+      find_key_pitches(request, network, planned.machine, *analysis.shapes, found.pitches, curves);
   // The chosen forms allow more stiffness than the published scheme. Keys may use it up to the
   // highest mode that is played.
   if (planned.more > 1.0) {

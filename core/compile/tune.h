@@ -13,10 +13,11 @@
 namespace ressort::compile {
 
 struct TunedKeys {
-  std::optional<Mode> mode;     // the mode that keys tune, with its sounding frequency
-  Pitches pitches;              // pitches with the parameters at their start values; empty: untuned
-  std::vector<Pitches> by_key;  // [key] the same at its own parameters, near its pitch; may be empty
-  PitchesAlong along;           // along the one parameter that leaves keys in tune; may be empty
+  std::optional<Mode> mode;  // the mode that keys tune, with its sounding frequency
+  Pitches pitches;           // pitches with the parameters at their start values; empty: untuned
+  std::vector<Pitches>
+      by_key;          // [key] the same at its own parameters, near its pitch; may be empty
+  PitchesAlong along;  // along the one parameter that leaves keys in tune; may be empty
   double highest_factor = 0.0;  // largest stiffness factor that keys may use
   std::vector<double> away;     // the same at equal steps from the box to the limits, as in Margins
   std::vector<std::string> notes;

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "core/engine/mix.h"
-#include "core/kernels/threads/kernel_task.h"
 #include "core/kernels/registry.h"
+#include "core/kernels/threads/kernel_task.h"
 #include "core/progress.h"
 
 namespace ressort::engine {

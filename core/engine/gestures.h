@@ -98,8 +98,8 @@ class Gestures {
   std::vector<InputDriver> drivers_;  // [lane][input]
   std::vector<double> pitches_;  // [lane] ratio to the written pitch, for which bow speeds are set
   std::vector<bool> keeps_speed_;  // [input] bows there do not follow the pitch
-  std::vector<double> starts_;   // [channel][input] initial position of a new voice's driver
-  std::uint64_t strokes_ = 0;    // notes played so far, for round robins
+  std::vector<double> starts_;     // [channel][input] initial position of a new voice's driver
+  std::uint64_t strokes_ = 0;      // notes played so far, for round robins
 };
 
 }  // namespace ressort::engine

@@ -153,7 +153,7 @@ class Keyboard {
 
   const Playing& playing_;
   double rate_hz_;
-  bool rings_on_;   // a louder voice rings on beside a repeated key's new one
+  bool rings_on_;  // a louder voice rings on beside a repeated key's new one
   bool is_stereo_;
   Channels channels_;
   VoiceTuning tuning_;

@@ -1,4 +1,5 @@
-// core/engine: the LFOs of all voices. They move pitch, level and parameters of each note by itself.
+// core/engine: the LFOs of all voices. They move pitch, level and parameters of each note by
+// itself.
 #pragma once
 
 #include <cstddef>

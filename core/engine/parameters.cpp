@@ -131,9 +131,8 @@ void Parameters::apply(Bank<T>& bank, const Voices& voices, EnergyWatch& watch) 
       watch.mark_driven(voice, lane, group.part);
       const bool ramped = !voice.is_new && !playing_.bare;
       const auto set = [&](std::uint32_t c) {
-        const double value =
-            coefficient_value(part.program, part.program.coefficients[c], values_in(lane),
-                              voice.factor);
+        const double value = coefficient_value(part.program, part.program.coefficients[c],
+                                               values_in(lane), voice.factor);
         kernel.coefficients.set(lane - group.first, c, value, ramped);
       };
       for (std::uint32_t c = 0; is_tuned && c < part.program.coefficients.size(); ++c) {

@@ -47,9 +47,9 @@ class Parameters {
   double within_limits(std::size_t index, double value) const;
   // Returns the values in one voice. They differ from values() if the preset has curves.
   std::span<const double> values_in(std::size_t lane) const {
-    return voice_values_.empty() ? std::span(values_)
-                                 : std::span(voice_values_)
-                                       .subspan(lane * values_.size(), values_.size());
+    return voice_values_.empty()
+               ? std::span(values_)
+               : std::span(voice_values_).subspan(lane * values_.size(), values_.size());
   }
   void update_voice_values(const Voices& voices);
 

@@ -34,8 +34,9 @@ struct Control {
   Gesture gesture = Gesture::position;
   std::uint16_t target = 0;  // index into Machine::inputs or Machine::parameters
   bool throws = false;       // strikes a mass that no spring holds, such as a hammer
-  GestureSettings settings;        // for a sound without a key, those of middle C
-  std::vector<KeySettings> by_key;  // the settings at some keys, ascending; empty: on all keys alike
+  GestureSettings settings;  // for a sound without a key, those of middle C
+  std::vector<KeySettings>
+      by_key;  // the settings at some keys, ascending; empty: on all keys alike
 
   // [audio] wait-free, O(keys)
   GestureSettings settings_on(double key) const {
@@ -97,14 +98,14 @@ struct VelocityCurve {
 
 struct Playing {
   int voices = 1;
-  double gain = 1.0;                // output per unit of position
-  double body_gain = 1.0;           // from the outputs to what is heard, at the loudest frequency
-  double mean_body_gain = 1.0;      // the same for white noise
-  bool bare = false;                // the network alone: no ramps, no smoothing, no sleep
-  double damper_s = 0.0;            // T60 of a released voice; 0: it rings freely
+  double gain = 1.0;            // output per unit of position
+  double body_gain = 1.0;       // from the outputs to what is heard, at the loudest frequency
+  double mean_body_gain = 1.0;  // the same for white noise
+  bool bare = false;            // the network alone: no ramps, no smoothing, no sleep
+  double damper_s = 0.0;        // T60 of a released voice; 0: it rings freely
   std::vector<CurvePoint> damper_keys;  // the same by key; replaces `damper_s`
-  std::vector<CurvePoint> keys_db;  // gain by key; empty: 0 dB
-  bool noise = false;               // the outputs modulate white noise
+  std::vector<CurvePoint> keys_db;      // gain by key; empty: 0 dB
+  bool noise = false;                   // the outputs modulate white noise
   Tuning tuning = Tuning::fixed;
   double transpose = 0.0;  // semitones, already included in keys_hz
   KeyFrequencies keys_hz = equal_temperament(440.0, 0.0);
@@ -115,8 +116,9 @@ struct Playing {
   double glide_s = 0.0;                  // portamento time, linear in cents
   NoteShare::Part share;                 // the notes that this engine plays, of several engines
   Pitches pitches;                       // pitches of the lowest mode
-  std::vector<Pitches> key_pitches;      // [key] the same at its own parameters, near its pitch; may be empty
-  PitchesAlong along;           // replaces `pitches` where a parameter must leave keys in tune
+  std::vector<Pitches>
+      key_pitches;     // [key] the same at its own parameters, near its pitch; may be empty
+  PitchesAlong along;  // replaces `pitches` where a parameter must leave keys in tune
   double highest_factor = 1.0;  // greatest stiffness factor that is proved stable
   std::vector<Limits> home;     // [parameter] range in which highest_factor holds; empty: anywhere
   std::vector<double> away;     // highest_factor at equal steps from `home` to `limits`

@@ -55,7 +55,8 @@ class VoiceTuning {
   double note_hz(int key, double own_hz) const {
     return own_hz > 0.0 ? own_hz : keys.frequency_hz(static_cast<std::size_t>(key));
   }
-  // Returns `hz`, or 0 if the frequency is above Nyquist or needs an unstable stiffness on this key.
+  // Returns `hz`, or 0 if the frequency is above Nyquist or needs an unstable stiffness on this
+  // key.
   double playable_hz(int key, double hz, double highest_factor) const {
     return hz < 0.5 * rate_hz_ && factor_at(key, hz) <= highest_factor ? hz : 0.0;
   }
@@ -94,10 +95,9 @@ class VoiceTuning {
     const double inside_hz =
         std::clamp(frequency_hz, own.lowest_hz,
                    own.lowest_hz * std::exp2(static_cast<double>(own.factors.size() - 1) / 12.0));
-    const double beyond = inside_hz == frequency_hz
-                              ? 1.0
-                              : playing_.pitches.factor_at(frequency_hz) /
-                                    playing_.pitches.factor_at(inside_hz);
+    const double beyond = inside_hz == frequency_hz ? 1.0
+                                                    : playing_.pitches.factor_at(frequency_hz) /
+                                                          playing_.pitches.factor_at(inside_hz);
     const double factor = beyond * own.factor_at(inside_hz);
     if (along.at.empty() || parameter_ == along.start) {
       return factor;

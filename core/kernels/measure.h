@@ -34,10 +34,9 @@ std::string timing_key(const Program& program, const Workload& load);
 bool is_measurable(const Program& program, const Workload& load);
 
 // Returns the ns per sample of all voices of the part in the form that it has, with every link that
-// can touch touching, except those of masses that nothing holds: from the store, or else measured and stored. Measuring takes a few
-// milliseconds: one block to warm up, then the median of at least three. Returns nothing if the
-// time is neither known nor measured.
-// [any thread but audio]
+// can touch touching, except those of masses that nothing holds: from the store, or else measured
+// and stored. Measuring takes a few milliseconds: one block to warm up, then the median of at least
+// three. Returns nothing if the time is neither known nor measured. [any thread but audio]
 std::optional<double> known_ns(const Program& program, const Workload& load,
                                const Timings& timings);
 

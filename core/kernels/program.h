@@ -103,7 +103,7 @@ struct AudioParameter {
 // nodes are the modes, and the point is between two of `places`, at each of which every mode has a
 // weight.
 struct TapSlot {
-  std::uint32_t node = 0;  // node of the point itself
+  std::uint32_t node = 0;   // node of the point itself
   std::uint32_t first = 0;  // its first node in Program::tap_nodes, row by row
   std::uint32_t length = 1;
   std::uint32_t width = 1;

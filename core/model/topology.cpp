@@ -217,7 +217,8 @@ class StringModes {
   // written as n^2 - (n^2 - 1) / (1 + B), where B occurs once, for the bounds of its range.
   Formula hz_of(std::uint32_t n, std::uint32_t string) const {
     const double square = static_cast<double>(n) * n;
-    Formula stretch = {{Op::number, 0, square}, {Op::number, 0, square - 1.0}, {Op::number, 0, 1.0}};
+    Formula stretch = {
+        {Op::number, 0, square}, {Op::number, 0, square - 1.0}, {Op::number, 0, 1.0}};
     append(stretch, network_.arguments[string_.inharmonicity]);
     append(stretch, {{Op::add},
                      {Op::divide},

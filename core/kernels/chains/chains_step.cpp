@@ -357,9 +357,8 @@ void step(const Program& program, const ChainsTables& tables, ChainsState<T>& st
 
 template <class T>
 ChainsLoops<T> loops_for(std::size_t bytes) {
-  return with_bytes<vector_bytes(Isa::RESSORT_ISA)>(bytes, []<std::size_t pack>() {
-    return ChainsLoops<T>{step<View<T, pack>, T>};
-  });
+  return with_bytes<vector_bytes(Isa::RESSORT_ISA)>(
+      bytes, []<std::size_t pack>() { return ChainsLoops<T>{step<View<T, pack>, T>}; });
 }
 
 }  // namespace

@@ -341,9 +341,8 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
 
 template <class T>
 DirectLoops<T> loops_for(std::size_t bytes) {
-  return with_bytes<vector_bytes(Isa::RESSORT_ISA)>(bytes, []<std::size_t pack>() {
-    return DirectLoops<T>{step<View<T, pack>, T>};
-  });
+  return with_bytes<vector_bytes(Isa::RESSORT_ISA)>(
+      bytes, []<std::size_t pack>() { return DirectLoops<T>{step<View<T, pack>, T>}; });
 }
 
 }  // namespace

@@ -515,10 +515,9 @@ void step(const Program& program, const Grid& grid, GridState<T>& state, const B
 template <class T>
 GridLoops<T> loops_for(std::size_t bytes) {
   constexpr std::size_t widest = vector_bytes(Isa::RESSORT_ISA);
-  return with_bytes < widest,
-         widest == 64 ? 32 : widest > (bytes, []<std::size_t pack>() {
-                               return GridLoops<T>{step<T, pack>};
-                             });
+  return with_bytes < widest, widest == 64 ? 32 : widest > (bytes, []<std::size_t pack>() {
+                                                    return GridLoops<T>{step<T, pack>};
+                                                  });
 }
 
 }  // namespace

@@ -5,8 +5,8 @@
 #include <limits>
 #include <memory>
 
-#include "core/kernels/threads/executor.h"
 #include "core/kernels/kernel.h"
+#include "core/kernels/threads/executor.h"
 
 namespace ressort::kernels {
 

@@ -686,12 +686,11 @@ std::string faust_header(const Network& network, std::span<const std::string> ma
   std::vector<std::string> heard(static_cast<std::size_t>(output_count(network)));
   for (const Output& output : network.outputs) {
     std::string& sum = heard[static_cast<std::size_t>(output.number - 1)];
-    sum += (sum.empty() ? "" : ", ") +
-           ((output.is_force             ? "force on "
-             : output.derivative == 0 ? "position of "
-             : output.derivative == 1 ? "velocity of "
-                                      : "acceleration of ") +
-            masses[output.mass]);
+    sum += (sum.empty() ? "" : ", ") + ((output.is_force          ? "force on "
+                                         : output.derivative == 0 ? "position of "
+                                         : output.derivative == 1 ? "velocity of "
+                                                                  : "acceleration of ") +
+                                        masses[output.mass]);
   }
   for (std::size_t n = 0; n < heard.size(); ++n) {
     text += "// output " + std::to_string(n + 1) + ": " +

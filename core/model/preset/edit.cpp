@@ -201,7 +201,7 @@ std::string edit(std::string_view text, const PresetChanges& changes) {
                value != nullptr && value->value_or(0.0) != setting.value) {
       const bool moves_curve = row->get("keys") != nullptr && row->get("keys_at") == nullptr;
       editor.replace(*value, in_toml(setting.value) +
-                                 (!moves_curve        ? ""
+                                 (!moves_curve       ? ""
                                   : row->is_inline() ? ", keys_at = "
                                                      : "\nkeys_at = ") +
                                  (moves_curve ? in_toml(value->value_or(0.0)) : ""));

@@ -34,20 +34,17 @@ std::string misfit_in_voices(const Network& network, const Preset& preset, const
   for (const BodyModel& body : preset.bodies) {
     if (find_parameter(body.network, name) >= 0) {
       return quoted(name) + " is a parameter of " + quoted(body.name()) +
-             " in 'through', which all voices share, so it has no " + what +
-             "; rename one of them";
+             " in 'through', which all voices share, so it has no " + what + "; rename one of them";
     }
   }
   const auto is_read = [&](const Step& step) {
     return step.op == Op::parameter && step.index == static_cast<std::uint32_t>(index);
   };
   for (const Output& output : network.outputs) {
-    const Formula level =
-        output.level == no_argument ? Formula() : network.arguments[output.level];
+    const Formula level = output.level == no_argument ? Formula() : network.arguments[output.level];
     if (std::any_of(level.begin(), level.end(), is_read)) {
-      return quoted(name) +
-             " sets the level of an output, which all voices share, so it has no " + what +
-             "; use 'keys_db' for a level by key";
+      return quoted(name) + " sets the level of an output, which all voices share, so it has no " +
+             what + "; use 'keys_db' for a level by key";
     }
   }
   return "";

@@ -443,14 +443,16 @@ void read_lfo(const toml::table& table, Preset& preset, std::vector<Error>& erro
 // Checks the control of an LFO, which has no gesture.
 void check_lfo_control(const toml::table& table, const ControlSetting& control, TomlTable& reader) {
   if (control.gesture != Gesture::parameter) {
-    reader.fail(table,
-                "an LFO moves \"pitch\" (in cents), \"level\" (in dB) or a parameter; set 'to' to one "
-                "of them");
+    reader.fail(
+        table,
+        "an LFO moves \"pitch\" (in cents), \"level\" (in dB) or a parameter; set 'to' to one "
+        "of them");
   }
   if (table.get("range") == nullptr) {
-    reader.fail(table,
-                "the control of an LFO needs 'range': cents, dB, or factors of a parameter, range = "
-                "[-10, 10]");
+    reader.fail(
+        table,
+        "the control of an LFO needs 'range': cents, dB, or factors of a parameter, range = "
+        "[-10, 10]");
   }
   for (const auto& [key, node] : table) {
     if (key.str() != "from" && key.str() != "to" && key.str() != "range") {
@@ -519,8 +521,8 @@ bool read_by_key(TomlTable& reader, const ControlSetting& control, const Numbers
   }
   const toml::array* const rows = table->get_as<toml::array>("keys");
   if (rows == nullptr || table->size() != 1) {
-    return reader.fail(*node, quoted(numbers.name) + " by key is a table: { keys = " +
-                                  numbers.example + " }");
+    return reader.fail(
+        *node, quoted(numbers.name) + " by key is a table: { keys = " + numbers.example + " }");
   }
   if (control.source != ControlSource::note || control.gesture == Gesture::parameter) {
     return reader.fail(*node, quoted(numbers.name) +
@@ -594,10 +596,9 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
                ? read_by_key<3>(reader, control, numbers, points, low, high)
                : reader.pair(numbers.name, low, high, numbers.least, numbers.most);
   };
-  const bool has_range =
-      pair_or_keys({"range", "[[21, 0.1, 1], [108, 0.2, 2]]", "[key, low, high]", -1e12, 1e12,
-                    "a key lies between 0 and 127"},
-                   control.range_keys, control.low, control.high);
+  const bool has_range = pair_or_keys({"range", "[[21, 0.1, 1], [108, 0.2, 2]]", "[key, low, high]",
+                                       -1e12, 1e12, "a key lies between 0 and 127"},
+                                      control.range_keys, control.low, control.high);
   const toml::node* const travel = reader.get("travel");
   double same_travel = 0.0;
   const bool has_travel =
@@ -686,9 +687,8 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
   }
   const GestureRow& gesture = row_of(control.gesture);
   if (!gesture.needs_travel.empty() && (has_travel || table.get("travel") == nullptr) &&
-      !(control.travel > 0.0 &&
-        std::all_of(control.travel_keys.begin(), control.travel_keys.end(),
-                    [](const KeyPair& point) { return point[1] > 0.0; }))) {
+      !(control.travel > 0.0 && std::all_of(control.travel_keys.begin(), control.travel_keys.end(),
+                                            [](const KeyPair& point) { return point[1] > 0.0; }))) {
     reader.fail(table, "a " + std::string(gesture.name) +
                            " needs 'travel': " + std::string(gesture.needs_travel));
   }
@@ -1009,8 +1009,8 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
 
 std::vector<double> curve_keys(const ControlSetting& control) {
   std::set<double> keys;
-  for (const auto* const points : {&control.range_keys, &control.travel_keys, &control.level_keys,
-                                   &control.length_keys}) {
+  for (const auto* const points :
+       {&control.range_keys, &control.travel_keys, &control.level_keys, &control.length_keys}) {
     for (const KeyPair& point : *points) {
       keys.insert(point[0]);
     }

@@ -113,18 +113,19 @@ struct Preset {
   std::vector<std::string> with;        // more models, appended to its text
   std::vector<std::string> through;     // models that the sum of all voices passes through
   SourceLocation through_location;
-  std::vector<BodyModel> bodies;        // the same, read by the loader
-  std::vector<std::string> fixed;       // labels of elements whose stiffness keys do not change
-  std::string description;              // one line
+  std::vector<BodyModel> bodies;   // the same, read by the loader
+  std::vector<std::string> fixed;  // labels of elements whose stiffness keys do not change
+  std::string description;         // one line
   int voices = 1;
-  double gain = 1.0;      // output per unit of position
-  double damper_s = 0.0;  // T60 after note-off; 0: no damper
+  double gain = 1.0;                    // output per unit of position
+  double damper_s = 0.0;                // T60 after note-off; 0: no damper
   std::vector<CurvePoint> damper_keys;  // the same by key; replaces `damper_s`, then of middle C
-  std::vector<CurvePoint> keys_db;  // gain by key: keys and dB, ascending; empty: 0
-  bool noise = false;               // the outputs modulate white noise
-  bool keyboard = true;             // keys set the pitch
-  int transpose = 0;                // semitones
-  // Flattening of the sound against the lowest mode, which keys compensate: keys and cents, ascending.
+  std::vector<CurvePoint> keys_db;      // gain by key: keys and dB, ascending; empty: 0
+  bool noise = false;                   // the outputs modulate white noise
+  bool keyboard = true;                 // keys set the pitch
+  int transpose = 0;                    // semitones
+  // Flattening of the sound against the lowest mode, which keys compensate: keys and cents,
+  // ascending.
   std::vector<CurvePoint> flattening_cents;
   std::string tuned_along;  // parameter along which keys stay in tune; empty: none
   SourceLocation tuned_along_location;

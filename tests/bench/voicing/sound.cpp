@@ -472,9 +472,9 @@ PartialsPitch partials_pitch(const Stereo& sound, double wanted_hz) {
       low = a;
     }
   }
-  const auto strongest = std::max_element(
-      partials.begin(), partials.end(),
-      [](const Partial& a, const Partial& b) { return a.power < b.power; });
+  const auto strongest =
+      std::max_element(partials.begin(), partials.end(),
+                       [](const Partial& a, const Partial& b) { return a.power < b.power; });
   return {.cents = fit_partials(partials, high).cents,
           .stiffness = high,
           .strongest = strongest == partials.end() ? 1 : strongest->n};

@@ -78,9 +78,9 @@ struct PartialsPitch {
 // Returns how far partial n of a stiff string is above n times the first (Fletcher 1964).
 double stretch_cents(int n, double stiffness);
 
-// Measures the first eight partials, weighted by their powers. A partial lies within half a semitone
-// of its harmonic. Tuning devices for pianos do the same: they find B from the partials of the
-// string, and subtract its stretch from every partial.
+// Measures the first eight partials, weighted by their powers. A partial lies within half a
+// semitone of its harmonic. Tuning devices for pianos do the same: they find B from the partials of
+// the string, and subtract its stretch from every partial.
 PartialsPitch partials_pitch(const Stereo& sound, double wanted_hz);
 
 double cents(double hz, double from_hz);

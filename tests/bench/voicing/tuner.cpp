@@ -89,11 +89,12 @@ int check_semitones(Player& player, const std::string& name) {
     worst_partials = std::max(worst_partials, std::fabs(reading->partials.cents));
     if (reading->is_off()) {
       ++off;
-      std::printf("  %s key %d: YIN %+.1f cents, of partial %d %+.1f, step %+.1f, partials %+.1f "
-                  "(B %.1e)\n",
-                  name.c_str(), key, reading->whole_cents, reading->partials.strongest,
-                  reading->strongest_cents, reading->step_cents, reading->partials.cents,
-                  reading->partials.stiffness);
+      std::printf(
+          "  %s key %d: YIN %+.1f cents, of partial %d %+.1f, step %+.1f, partials %+.1f "
+          "(B %.1e)\n",
+          name.c_str(), key, reading->whole_cents, reading->partials.strongest,
+          reading->strongest_cents, reading->step_cents, reading->partials.cents,
+          reading->partials.stiffness);
     }
     last = reading;
   }

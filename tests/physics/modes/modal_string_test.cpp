@@ -94,14 +94,15 @@ TEST_CASE("a modal string sounds its partials with their decay at every rate", "
 
 TEST_CASE("a steady force at x presses on the bridge with the share x", "[modal_string]") {
   // The mode of partial n yields by F sin(n pi x) / (n^2 K) without stiffness, K that of partial 1.
-  // The bridge's place therefore reads F/K times the sum of (-1)^(n+1) sin(n pi x) / n, which is pi x / 2.
+  // The bridge's place therefore reads F/K times the sum of (-1)^(n+1) sin(n pi x) / n, which is pi
+  // x / 2.
   constexpr double omega = 2.0 * pi * 100.0 / 44100.0;
   constexpr double sigma = 60.0 / 44100.0;
   for (const double x : {0.1, 0.35, 0.6}) {
-    Bare<double> bare(make_program(
-        network_of("@s modalString 200 2. 100. 0 60 0 0\n@in1 frcInput [@s " + digits(x) +
-                   "]\n@out1 posOutput [@s bridge]\n"),
-        44100.0, true));
+    Bare<double> bare(
+        make_program(network_of("@s modalString 200 2. 100. 0 60 0 0\n@in1 frcInput [@s " +
+                                digits(x) + "]\n@out1 posOutput [@s bridge]\n"),
+                     44100.0, true));
     double pressed = 0.0;
     for (int n = 0; n < 10000; ++n) {
       pressed = bare.step({1.0})[0];
@@ -143,8 +144,11 @@ TEST_CASE("all keys sound at a place that a parameter sets", "[modal_string]") {
   constexpr double rate_hz = 44100.0;
   const auto played = [&](const std::string& in, const std::string& out, int key) {
     const Preset preset = support::struck(1);
-    Player player("@u param 0.137\n@s modalString 64 2. 110. 0 1 0 0\n"
-                  "@in1 frcInput [@s " + in + "]\n@out1 posOutput [@s " + out + "]\n", preset);
+    Player player(
+        "@u param 0.137\n@s modalString 64 2. 110. 0 1 0 0\n"
+        "@in1 frcInput [@s " +
+            in + "]\n@out1 posOutput [@s " + out + "]\n",
+        preset);
     player.run(14000, {note_on(0, key)});
     return player.out[0];
   };
@@ -152,8 +156,7 @@ TEST_CASE("all keys sound at a place that a parameter sets", "[modal_string]") {
     const double hz = 440.0 * std::exp2((key - 69) / 12.0);
     const std::vector<double> fixed = played("0.137", "0.3", key);
     for (const bool is_heard : {false, true}) {
-      const std::vector<double> set =
-          is_heard ? played("0.3", "u", key) : played("u", "0.3", key);
+      const std::vector<double> set = is_heard ? played("0.3", "u", key) : played("u", "0.3", key);
       for (int n = 1; n <= 6; ++n) {
         const auto level = [&](const std::vector<double>& y) {
           return level_at(y, rate_hz, n * hz, 0.2, 0.2);
@@ -162,8 +165,9 @@ TEST_CASE("all keys sound at a place that a parameter sets", "[modal_string]") {
         const double miss = std::pow(n * pi / (8.0 * 64.0), 2) / 8.0;
         const double share = std::fabs(std::sin(n * pi * 0.137));
         INFO("key " << key << ", partial " << n << (is_heard ? ", heard" : ", struck"));
-        CHECK(level(set) ==
-              Approx(level(fixed) * std::pow(half / std::sin(half), 2)).epsilon(miss / share + 1e-3));
+        CHECK(
+            level(set) ==
+            Approx(level(fixed) * std::pow(half / std::sin(half), 2)).epsilon(miss / share + 1e-3));
       }
     }
   }
@@ -176,17 +180,15 @@ TEST_CASE("strings over one bridge have the slopes of Weinreich's matrix", "[mod
     double g;
     int partial;
   };
-  for (const Case& c :
-       {Case{1, 0.0, 1.4, 1}, Case{2, 0.8, 0.7, 1}, Case{2, 4.0, 0.7, 1}, Case{3, 1.2, 0.5, 1},
-        Case{2, 0.25, 0.7, 3}, Case{3, 0.25, 0.5, 4}}) {
+  for (const Case& c : {Case{1, 0.0, 1.4, 1}, Case{2, 0.8, 0.7, 1}, Case{2, 4.0, 0.7, 1},
+                        Case{3, 1.2, 0.5, 1}, Case{2, 0.25, 0.7, 3}, Case{3, 0.25, 0.5, 4}}) {
     constexpr double hz = 261.6;
     constexpr double rate_hz = 44100.0;
     constexpr double loss = 0.2;
-    const std::vector<double> sound =
-        struck("@s modalString 5 3. 261.6 0 0.2 0 0 " + std::to_string(c.strings) + " " +
-                   digits(c.cents) + " " + digits(c.g) +
-                   "\n@in1 frcInput [@s 0.13]\n@out1 posOutput [@s bridge]\n",
-               rate_hz, static_cast<std::size_t>(9.5 * rate_hz));
+    const std::vector<double> sound = struck(
+        "@s modalString 5 3. 261.6 0 0.2 0 0 " + std::to_string(c.strings) + " " + digits(c.cents) +
+            " " + digits(c.g) + "\n@in1 frcInput [@s 0.13]\n@out1 posOutput [@s bridge]\n",
+        rate_hz, static_cast<std::size_t>(9.5 * rate_hz));
     std::vector<double> offsets;
     for (int k = 0; k < c.strings; ++k) {
       const double by = c.strings > 1 ? k / (c.strings - 1.0) - 0.5 : 0.0;
@@ -195,9 +197,7 @@ TEST_CASE("strings over one bridge have the slopes of Weinreich's matrix", "[mod
     const auto expected = [&](double s) {
       return level_of_strings(offsets, c.g, s) * std::exp(-loss * s);
     };
-    const auto level = [&](double s) {
-      return level_at(sound, rate_hz, c.partial * hz, s, 0.05);
-    };
+    const auto level = [&](double s) { return level_at(sound, rate_hz, c.partial * hz, s, 0.05); };
     const double first = level(0.1) / expected(0.1);
     INFO(c.strings << " strings, " << c.cents << " cents, partial " << c.partial);
     double largest = 0.0;
@@ -233,8 +233,7 @@ TEST_CASE("a hammer on coupled strings never gains energy", "[modal_string]") {
       Passivity::always);
   std::vector<double> values;
   for (const Coefficient& coefficient : lab.program().coefficients) {
-    values.push_back(
-        coefficient_value(lab.program(), coefficient, lab.program().parameters, 1.0));
+    values.push_back(coefficient_value(lab.program(), coefficient, lab.program().parameters, 1.0));
   }
   const engine::LaneValues<double> lane{.value = values.data()};
   const auto energy = [&] {

@@ -41,7 +41,9 @@ double key_hz(int key) {
 
 // The interval of both partials, for which the string's B is the only cause.
 double interval(const std::vector<double>& y, double hz, double b) {
-  const auto heard = [&](double guess) { return partial_of(y, 44100.0, guess, 0.05, 1.0, 0.01).hz; };
+  const auto heard = [&](double guess) {
+    return partial_of(y, 44100.0, guess, 0.05, 1.0, 0.01).hz;
+  };
   return heard(hz * 2.0 * std::sqrt((1.0 + 4.0 * b) / (1.0 + b))) / heard(hz);
 }
 
@@ -137,8 +139,7 @@ TEST_CASE("a strike's velocity changes its own voice, and a re-strike changes it
 }
 
 // A mass that a force pushes without any spring of note: its velocity shows the pulse.
-const std::string free_mass =
-    "@m osc 1. 1.357e-6 0. 0. 0.\n@in1 frcInput @m\n@out1 posOutput @m\n";
+const std::string free_mass = "@m osc 1. 1.357e-6 0. 0. 0.\n@in1 frcInput @m\n@out1 posOutput @m\n";
 
 // Returns the time in which the velocity of the mass goes from 10 to 90 % of its final value.
 double rise_ms(const Preset& preset, int key) {

@@ -189,9 +189,8 @@ TEST_CASE("slow random steps give each note a value of its own, from its start",
     CHECK(notes.back() < 600.0 * std::log2(1.1));
   }
   std::sort(notes.begin(), notes.end());
-  CHECK(std::adjacent_find(notes.begin(), notes.end(), [](double a, double b) {
-          return b - a < 1e-3;
-        }) == notes.end());
+  CHECK(std::adjacent_find(notes.begin(), notes.end(),
+                           [](double a, double b) { return b - a < 1e-3; }) == notes.end());
   CHECK(notes.back() - notes.front() > 50.0);  // of 174
 }
 
@@ -208,8 +207,7 @@ TEST_CASE("the rate differs from note to note by its deviation, and repeats", "[
   CHECK(heard(preset, one_note) == heard(preset, one_note));
 }
 
-TEST_CASE("variation changes strength and time within its bounds, and keeps releases",
-          "[lfo]") {
+TEST_CASE("variation changes strength and time within its bounds, and keeps releases", "[lfo]") {
   constexpr std::uint32_t period = 22050;
   std::vector<Event> events;
   for (std::uint32_t i = 0; i < 20; ++i) {

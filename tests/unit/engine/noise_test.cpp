@@ -127,8 +127,7 @@ TEST_CASE("a force has the level of its noise, whatever the sample rate", "[nois
   }
 }
 
-TEST_CASE("a burst decays by its T60 and ends, and the key's pitch does not change it",
-          "[noise]") {
+TEST_CASE("a burst decays by its T60 and ends, and the key's pitch does not change it", "[noise]") {
   for (const int key : {36, 96}) {
     CAPTURE(key);
     Preset preset = played(noise_of(1.0, 200.0, 500.0, 8000.0));

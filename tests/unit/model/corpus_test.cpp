@@ -293,8 +293,8 @@ TEST_CASE("the corpus uses every keyword, and the table every file", "[corpus]")
     INFO(keyword.word);
     // The reference of this test knows neither modal strings nor the engine's differences. They
     // have tests of their own.
-    const bool has_own_test = keyword.word == "modalString" || keyword.word == "velOutput" ||
-                              keyword.word == "accOutput";
+    const bool has_own_test =
+        keyword.word == "modalString" || keyword.word == "velOutput" || keyword.word == "accOutput";
     CHECK((words.contains(keyword.word) || has_own_test));
   }
 }
