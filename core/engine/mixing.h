@@ -83,7 +83,9 @@ void Mixing::compare(std::size_t frames, Voices& voices, Invert&& invert) {
     voice.beside = goes_on ? voice.beside : nullptr;
     is_comparing |= goes_on;
   }
-  std::fill(rows_.begin(), rows_.end(), 0.0);
+  for (std::size_t at = 0; at < rows_.size(); at += max_block_frames) {
+    std::fill_n(rows_.begin() + static_cast<std::ptrdiff_t>(at), frames, 0.0);
+  }
   voices.set_comparing(is_comparing);
 }
 

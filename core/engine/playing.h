@@ -32,11 +32,10 @@ struct Control {
   std::uint8_t turn = 0;   // position in a round robin of notes, from 0
   std::uint8_t turns = 1;  // number of controls in the round robin
   Gesture gesture = Gesture::position;
-  std::uint16_t target = 0;  // index into Machine::inputs or Machine::parameters
-  bool throws = false;       // strikes a mass that no spring holds, such as a hammer
-  GestureSettings settings;  // for a sound without a key, those of middle C
-  std::vector<KeySettings>
-      by_key;  // the settings at some keys, ascending; empty: on all keys alike
+  std::uint16_t target = 0;         // index into Machine::inputs or Machine::parameters
+  bool throws = false;              // strikes a mass that no spring holds, such as a hammer
+  GestureSettings settings;         // for a sound without a key, those of middle C
+  std::vector<KeySettings> by_key;  // settings at some keys, ascending; empty: all keys alike
 
   // [audio] wait-free, O(keys)
   GestureSettings settings_on(double key) const {
@@ -116,9 +115,9 @@ struct Playing {
   double glide_s = 0.0;                  // portamento time, linear in cents
   NoteShare::Part share;                 // the notes that this engine plays, of several engines
   Pitches pitches;                       // pitches of the lowest mode
-  std::vector<Pitches>
-      key_pitches;     // [key] the same at its own parameters, near its pitch; may be empty
-  PitchesAlong along;  // replaces `pitches` where a parameter must leave keys in tune
+  // [key] the same at its own parameters, near its pitch; may be empty
+  std::vector<Pitches> key_pitches;
+  PitchesAlong along;           // replaces `pitches` where a parameter must leave keys in tune
   double highest_factor = 1.0;  // greatest stiffness factor that is proved stable
   std::vector<Limits> home;     // [parameter] range in which highest_factor holds; empty: anywhere
   std::vector<double> away;     // highest_factor at equal steps from `home` to `limits`

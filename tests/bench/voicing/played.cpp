@@ -13,18 +13,6 @@ namespace {
 constexpr double played_rate_hz = 48000.0;
 constexpr double played_s = 1.0;
 constexpr double between_strikes_s = 0.1;
-constexpr int played_velocity = 100;
-constexpr int channel_keys = 64;  // of one channel
-
-// Each voice has a key of its own, from `lowest` on, of its own channel where channel_keys run out.
-std::vector<TimedEvent> chord(int voices, int lowest, int step) {
-  std::vector<TimedEvent> events;
-  for (int voice = 0; voice < voices; ++voice) {
-    events.push_back({0.0, note_on(lowest + step * (voice % channel_keys), played_velocity)});
-    events.back().event.channel = static_cast<std::uint8_t>(voice / channel_keys);
-  }
-  return events;
-}
 
 std::vector<TimedEvent> restruck(const std::vector<TimedEvent>& once) {
   std::vector<TimedEvent> events;
@@ -54,15 +42,14 @@ int print_played(const std::vector<std::string>& names, int turns) {
     try {
       Player player(name, played_rate_hz);
       const int voices = player.instrument().voices;
-      const int step = voices <= channel_keys / 4 ? 2 : 1;
-      const std::vector<TimedEvent> all = chord(voices, voices <= channel_keys / 4 ? 48 : 28, step);
+      const std::vector<TimedEvent> all = chord(voices);
       const std::array<std::vector<TimedEvent>, 6> played = {
           {{},
            chord(1, 60, 1),
            all,
            restruck(all),
            chord(voices, 28, 1),
-           chord(voices, std::max(28, 97 - std::min(voices, channel_keys)), 1)}};
+           chord(voices, std::max(28, 97 - voices), 1)}};
       std::array<std::vector<double>, played.size()> shares;
       for (int turn = 0; turn < turns; ++turn) {
         for (std::size_t i = 0; i < played.size(); ++i) {

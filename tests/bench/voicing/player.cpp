@@ -52,6 +52,19 @@ Event press(double amount) {
   return {.kind = EventKind::pressure, .value = amount};
 }
 
+std::vector<TimedEvent> chord(int voices, int lowest, int step) {
+  constexpr int keys = 64;
+  std::vector<TimedEvent> events;
+  for (int voice = 0; voice < voices; ++voice) {
+    events.push_back({0.0, note_on(lowest + step * (voice % keys), 100)});
+    events.back().event.channel = static_cast<std::uint8_t>(voice / keys);
+  }
+  return events;
+}
+std::vector<TimedEvent> chord(int voices) {
+  return voices <= 16 ? chord(voices, 48, 2) : chord(voices, 28, 1);
+}
+
 Player::Player(const std::string& name, double rate_hz, bool with_lfos)
     : scene_(scene_of(name, with_lfos)),
       compiled_(compiled_of(scene_, rate_hz)),
@@ -127,18 +140,9 @@ void Player::run(const std::vector<TimedEvent>& events, double seconds, Stereo* 
 }
 
 double Player::real_time_share(double seconds, int voices) {
-  // Every voice has its own key of its own channel.
-  constexpr int keys = 64;
-  const int lowest = voices <= keys / 4 ? 48 : 28;
-  const int step = voices <= keys / 4 ? 2 : 1;
-  std::vector<TimedEvent> chord;
-  for (int voice = 0; voice < voices; ++voice) {
-    chord.push_back({0.0, note_on(lowest + step * (voice % keys), 100)});
-    chord.back().event.channel = static_cast<std::uint8_t>(voice / keys);
-  }
   double least = 1e9;
   for (int turn = 0; turn < 3; ++turn) {
-    least = std::min(least, processor_share(chord, seconds));
+    least = std::min(least, processor_share(chord(voices), seconds));
   }
   return least;
 }

@@ -23,6 +23,12 @@ Event note_off(int key);
 Event turn(int controller, double amount);
 Event press(double amount);  // the whole channel
 
+// Returns a note of forte for each voice, on a key of its own from `lowest` on, `step` semitones
+// apart. Beyond 64 notes the keys begin again on the next channel.
+std::vector<TimedEvent> chord(int voices, int lowest, int step);
+// Returns such a chord from C3 up in whole tones, or with more than 16 voices from E1 in semitones.
+std::vector<TimedEvent> chord(int voices);
+
 class Player {
  public:
   // Throws std::runtime_error with all errors. Without LFOs, a bow plays without vibrato.
