@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "core/random.h"
 
@@ -9,12 +10,14 @@ namespace ressort::engine {
 namespace {
 
 constexpr double compared_s = 0.01;
+constexpr double compared_hz = 200.0;  // corner of the lowpass
 
 }  // namespace
 
 Mixing::Mixing(const Playing& playing, double rate_hz, std::size_t lanes)
     : gain_(playing.gain),
       least_compared_(static_cast<std::size_t>(compared_s * rate_hz)),
+      lowpass_(1.0 - std::exp(-2.0 * std::numbers::pi * compared_hz / rate_hz)),
       rows_(lanes * max_block_frames),
       bound_(playing.bare
                  ? runaway

@@ -27,8 +27,9 @@ class Mixing {
            EnergyWatch& watch);
   // Calls invert(voice) for a new voice that takes from the sound of an earlier voice of its key:
   // the sum of the products of both, over the first 10 ms of its sound, is negative. Two waves of
-  // one pitch add up or cancel by chance; the sign of the softer one is free. Called after all
-  // kernels have been mixed.
+  // one pitch add up or cancel by chance; the sign of the softer one is free. Both are lowpassed,
+  // because the first partials carry the level behind a body. Called after all kernels have been
+  // mixed.
   template <class Invert>
   void compare(std::size_t frames, Voices& voices, Invert&& invert);
   // Mixes the frozen voices of a kernel.
@@ -55,6 +56,7 @@ class Mixing {
 
   double gain_;
   std::size_t least_compared_;  // frames
+  double lowpass_;              // share of the difference that the lowpass takes per frame
   std::vector<double> rows_;    // [lane][frame] sum of a voice's outputs, while voices are compared
   double bound_;                // largest output before gains; a voice beyond it is unstable
   std::uint64_t noise_ = 0x9e3779b97f4a7c15u;
@@ -71,7 +73,9 @@ void Mixing::compare(std::size_t frames, Voices& voices, Invert&& invert) {
     const double* const other = rows_.data() + voices.lane_of(*voice.beside) * max_block_frames;
     const double gain = gain_ * std::fabs(voice.strength);
     for (std::size_t n = 0; n < frames; ++n) {
-      voice.agreement += mine[n] * other[n];
+      voice.lowpassed += lowpass_ * (mine[n] - voice.lowpassed);
+      voice.lowpassed_beside += lowpass_ * (other[n] - voice.lowpassed_beside);
+      voice.agreement += voice.lowpassed * voice.lowpassed_beside;
       voice.compared_frames +=
           voice.compared_frames > 0 || gain * std::fabs(mine[n]) > quiet_level ? 1 : 0;
     }

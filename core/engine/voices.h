@@ -83,7 +83,9 @@ struct alignas(64) Voice {
   std::uint64_t turn = 0;         // serial number of its key press
   const Voice* beside = nullptr;  // earlier voice of its key, with which it is compared
   std::size_t compared_frames = 0;
-  double agreement = 0.0;         // sum of products of both outputs
+  double lowpassed = 0.0;         // its output while it is compared
+  double lowpassed_beside = 0.0;  // that of the earlier voice
+  double agreement = 0.0;         // sum of products of both
   double frequency_hz = 0.0;      // without bend; 0: as the model is written
   double key_hz = 0.0;            // requested frequency, before the stability limit
   double semitones = 0.0;         // its own channel's bend and tuning
