@@ -22,13 +22,17 @@ std::string digits(double value) {
   return print_number(value);
 }
 
-std::vector<double> struck(const std::string& text, double rate_hz, std::size_t frames) {
-  Bare<double> bare(make_program(network_of(text), rate_hz, true));
+std::vector<double> struck(const Program& program, std::size_t frames) {
+  Bare<double> bare(program);
   std::vector<double> sound;
   for (std::size_t n = 0; n < frames; ++n) {
     sound.push_back(bare.step({n == 0 ? 1.0 : 0.0})[0]);
   }
   return sound;
+}
+
+std::vector<double> struck(const std::string& text, double rate_hz, std::size_t frames) {
+  return struck(make_program(network_of(text), rate_hz, true), frames);
 }
 
 // The mean motion of strings that start alike, relative to its start: 1/N 1^T exp(A t) 1. String k
@@ -223,6 +227,33 @@ TEST_CASE("strings over one bridge have the slopes of Weinreich's matrix", "[mod
       CHECK(t60(level, 7.0, 9.3) > 3.0 * t60(level, 0.1, 0.6));
     }
   }
+}
+
+TEST_CASE("a felt that lies on a string damps each partial by its motion there", "[modal_string]") {
+  // To first order, a damper Z at x adds Z sin(n pi x)^2 / M per sample to the decay rate of
+  // partial n: its mode has the mass M/2. A mode that rests at x keeps its own rate. The felt may
+  // press with any Z without more steps: a hard one decouples the two sides of x.
+  constexpr double loss = 0.5;
+  constexpr double mass = 3.0;
+  constexpr double felt = 2e-4;
+  const auto with_felt = [&](double z) {
+    return struck(program_of("@s modalString 12 3. 220. 0 0.5 0 0\n@in1 frcInput [@s 0.13]\n"
+                             "@g ground 0.\n@felt contact @g [@s 0.2] 1e-9 " +
+                                 digits(z) + " 1000.\n@out1 posOutput [@s bridge]\n",
+                             Passivity::always),
+                  30000);
+  };
+  const std::vector<double> sound = with_felt(felt);
+  for (int n = 1; n <= 6; ++n) {
+    const double fall = std::log(level_at(sound, 44100.0, n * 220.0, 0.1, 0.1) /
+                                 level_at(sound, 44100.0, n * 220.0, 0.5, 0.1)) / 0.4;
+    INFO(n);
+    CHECK(fall == Approx(loss + 44100.0 * felt / mass * std::pow(std::sin(0.2 * n * pi), 2))
+                      .margin(0.02));
+  }
+  const std::vector<double> hard = with_felt(1e3);
+  CHECK(level_at(hard, 44100.0, 5.0 * 220.0, 0.5, 0.1) ==
+        Approx(level_at(hard, 44100.0, 5.0 * 220.0, 0.1, 0.1) * std::exp(-0.4 * loss)).epsilon(0.02));
 }
 
 TEST_CASE("a hammer on coupled strings never gains energy", "[modal_string]") {
