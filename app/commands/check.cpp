@@ -248,9 +248,7 @@ void warn(const Proved& proved, const Scene& scene, std::vector<Finding>& findin
 
 // Warns if the CPU is too slow for all voices.
 void warn(const Scene& scene, const Compiled& compiled, std::vector<Finding>& findings) {
-  const CompileOptions options;
-  const std::string text = overload_warning(compiled.plan, compiled.instrument.voices,
-                                            options.rate_hz, options.precision);
+  const std::string text = overload_warning(compiled, CompileOptions(), {.time = cpu_time_ns});
   if (!text.empty()) {
     Finding finding = finding_of(scene.path, "", Error{text});
     finding.diagnostic.severity = Severity::warning;

@@ -131,9 +131,7 @@ Result<std::shared_ptr<const Loaded>> SceneBuilder::play(const LoadRequest& requ
     return compiled.error();
   }
   if (!may_gain(compiled->plan)) {  // else improve() warns
-    if (std::string warning = overload_warning(compiled->plan, compiled->instrument.voices,
-                                               options.rate_hz, options.precision);
-        !warning.empty()) {
+    if (std::string warning = overload_warning(*compiled, options, timings_); !warning.empty()) {
       warnings.push_back(std::move(warning));
     }
   }
@@ -213,8 +211,7 @@ void SceneBuilder::improve() {
     current_.set_plan(std::move(playing));
     return;
   }
-  const std::string overload = overload_warning(compiled->plan, compiled->instrument.voices,
-                                                source.options.rate_hz, source.options.precision);
+  const std::string overload = overload_warning(*compiled, source.options, timings_);
   const auto broken = missed_budget(compiled->plan);
   current_.set_plan(std::move(compiled->plan));
   FlightEngine made_of = source.made_of;

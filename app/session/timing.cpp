@@ -42,12 +42,22 @@ void measure(Plan& plan, const Engine& engine, const CompileOptions& options, in
   }
 }
 
-std::string overload_warning(const Plan& plan, int voices, double rate_hz, Precision precision) {
-  double ns = 0.0;
-  for (const Part& part : plan.parts) {
-    ns += part.ns();
+std::string overload_warning(const Compiled& compiled, const CompileOptions& options,
+                             const Timings& timings) {
+  const int voices = compiled.instrument.voices;
+  const auto share_of = [&](const Plan& plan) {
+    double ns = 0.0;
+    for (const Part& part : plan.parts) {
+      ns += part.ns();
+    }
+    return ns * 1e-9 * options.rate_hz;
+  };
+  double share = share_of(compiled.plan);
+  if (share > DspLoad::most && timings.time) {
+    Plan measured = compiled.plan;
+    measure(measured, *compiled.engine, options, voices, timings);
+    share = share_of(measured);
   }
-  const double share = ns * 1e-9 * rate_hz;
   if (!(share > DspLoad::most)) {
     return {};
   }
@@ -61,7 +71,7 @@ std::string overload_warning(const Plan& plan, int voices, double rate_hz, Preci
          (fitting > 0  ? ": " + std::to_string(fitting) + " fit"
           : voices > 1 ? ", one alone " + percent(each)
                        : "") +
-         "; to lower the load, use " + ways_to_lower_load(fitting, precision);
+         "; to lower the load, use " + ways_to_lower_load(fitting, options.precision);
 }
 
 std::string ways_to_lower_load(int voices, Precision precision) {

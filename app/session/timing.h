@@ -17,9 +17,11 @@ double cpu_time_ns(const Program& program, const std::function<void()>& play);
 void measure(Plan& plan, const Engine& engine, const CompileOptions& options, int voices,
              const Timings& timings);
 
-// Returns a warning if one core is too slow for all voices as they are played, by the measured
-// cost if it is known; empty if it is fast enough. [any thread but audio]
-std::string overload_warning(const Plan& plan, int voices, double rate_hz, Precision precision);
+// Returns a warning if one core is too slow for all voices as they are played; empty if it is fast
+// enough. An estimate counts contacts as closed all the time, so a plan that it finds too dear is
+// measured. [any thread but audio]
+std::string overload_warning(const Compiled& compiled, const CompileOptions& options,
+                             const Timings& timings);
 
 // Returns ways to lower the load: "-p 3, a lower rate, ...". `voices`: how many fit; 0: none.
 std::string ways_to_lower_load(int voices, Precision precision);

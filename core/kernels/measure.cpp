@@ -97,7 +97,8 @@ class Trial {
   }
 
   // Moves one end of each open contact, pluck and the like to a quarter of its reach from the other
-  // end: a position input if the link has one, else a mass.
+  // end: a position input if the link has one, else a mass. A mass that nothing holds has flown
+  // away.
   void close_gaps() {
     const std::vector<bool> is_held = held_nodes();
     for (const LinkRun& run : program_.link_runs) {
@@ -113,8 +114,15 @@ class Trial {
       const double inside = law.zone == Zone::near ? 0.25 * reach : least_overlap;
       for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
         const auto [a, b] = program_.ends[i];
-        const bool is_thrown = (is_mass(a) && !is_held[a]) || (is_mass(b) && !is_held[b]);
-        if (is_thrown || law.gap(numbers, x_[a] - x_[b]) < 0.0) {
+        if (is_mass(a) && !is_held[a]) {
+          x_[a] = x_[b] - reach - flown;
+          continue;
+        }
+        if (is_mass(b) && !is_held[b]) {
+          x_[b] = x_[a] + reach + flown;
+          continue;
+        }
+        if (law.gap(numbers, x_[a] - x_[b]) < 0.0) {
           continue;
         }
         has_closed_ = true;
@@ -162,6 +170,7 @@ class Trial {
     }
   }
 
+  static constexpr double flown = 1.0;
   static constexpr double least_overlap = 1e-3;  // overlap of contacts, and amplitude of the noise
 
   const Program& program_;
