@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <optional>
+#include <string>
 #include <vector>
 
 namespace ressort::voicing {
@@ -75,6 +76,7 @@ int check_semitones(Player& player, const std::string& name) {
   int off = 0;
   double worst_step = 0.0;
   double worst_partials = 0.0;
+  std::string stretch;  // inharmonicity at every octave
   std::optional<Reading> last;
   for (int key = lowest_key; key <= highest_key; ++key) {
     std::optional<Reading> reading = read(player, key);
@@ -85,6 +87,11 @@ int check_semitones(Player& player, const std::string& name) {
       reading->step_cents = smaller_step(*last, *reading);
     }
     ++keys;
+    if (key % 12 == 0) {
+      char octave[32];
+      std::snprintf(octave, sizeof octave, " %d: %.1e", key, reading->partials.stiffness);
+      stretch += octave;
+    }
     worst_step = std::max(worst_step, std::fabs(reading->step_cents));
     worst_partials = std::max(worst_partials, std::fabs(reading->partials.cents));
     if (reading->is_off()) {
@@ -100,6 +107,7 @@ int check_semitones(Player& player, const std::string& name) {
   }
   std::printf("%s: %d of %d keys off, the worst step by %.1f cents, the worst partials by %.1f\n",
               name.c_str(), off, keys, worst_step, worst_partials);
+  std::printf("  B by key:%s\n", stretch.c_str());
   std::fflush(stdout);
   return off;
 }
