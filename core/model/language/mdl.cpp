@@ -392,6 +392,10 @@ void Reader::warn_of_mistakes() {
   for (const Input& input : network.inputs) {
     attached[input.mass] = attached[input.mass] || input.is_force;
   }
+  for (const Output& output : network.outputs) {  // a ground may be a constant output
+    attached[output.mass] =
+        attached[output.mass] || network.masses[output.mass].kind == MassKind::ground;
+  }
   for (std::size_t i = 0; i < network.masses.size(); ++i) {
     const Mass& mass = network.masses[i];
     if (!attached[i] && mass.kind != MassKind::oscillator && mass.kind != MassKind::point) {

@@ -2,9 +2,13 @@
 // arguments.
 #pragma once
 
+#include <functional>
 #include <map>
+#include <optional>
+#include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "core/model/language/reader.h"
@@ -21,14 +25,29 @@ struct Statement {
   std::vector<Token> names;
 };
 
-// `faustcode: name = expression;`
+// A FAUST signal without delays: a sum of elements, each times an expression in the .mdl language,
+// and a constant.
+struct SamSignal {
+  struct Part {
+    std::size_t element = 0;
+    int derivative = 0;     // of the position: 1 is the velocity, 2 the acceleration, per sample
+    bool is_force = false;  // the force on the element
+    std::string level;
+  };
+  std::vector<Part> parts;
+  std::string number = "0";
+
+  bool is_number() const { return parts.empty(); }
+};
+using SamSignals = std::vector<SamSignal>;  // parallel signals
+
+// `faustcode: name(arguments) = expression;`
 struct SamDefinition {
   Origin origin;
   Token expression;
-  bool is_parameter = false;
-  bool is_open = false;  // being resolved; detects cycles
-  bool is_read = false;
-  std::string text;  // text in the .mdl language, once resolved
+  std::vector<Token> arguments;
+  bool is_open = false;             // being evaluated; detects cycles
+  std::optional<SamSignals> value;  // without an input, once evaluated
 };
 
 inline constexpr std::size_t longest_expression = 10000;  // bytes, with all definitions inserted
@@ -38,23 +57,34 @@ inline constexpr int deepest_expression = 50;
 std::size_t word_length(std::string_view text);
 std::size_t number_length(std::string_view text);
 
+Token behind(const Token& token, std::size_t count);
+// Returns the offset of the ')' that closes the '(' at the start, or npos.
+std::size_t closing(std::string_view text);
+
 // Splits a token at `mark`, except within parentheses and quotes.
 std::vector<Token> divided(const Token& token, char mark);
 Token trimmed(Token token);
 
-// Parses the lines of a text and stores their definitions.
+// Parses the lines of a text, stores their definitions and evaluates FAUST expressions.
 class SamLines {
  public:
+  // Returns the signal of an element, or nothing after reporting an error.
+  using Listen = std::function<std::optional<SamSignal>(const Origin& line, const Token& name)>;
+
   void read(std::string_view text, const Progress& progress);
 
   // Translates an expression of parameters and numbers. Returns "0" after reporting an error.
-  std::string expression(const Origin& line, const Token& token) {
-    return expression(line, token, 0);
-  }
-  // Simplifies an expression in the .mdl language.
+  std::string expression(const Origin& line, const Token& token);
+  // Evaluates the signal of an output named `name`, whose elements `listen` returns.
+  std::optional<SamSignal> signal(const Origin& line, const Token& token, std::string_view name,
+                                  const Listen& listen);
+  // Joins two expressions by + - * / or ^. Returns a number if the result is too long.
+  std::string join(const Origin& line, const Token& token, const std::string& a, char op,
+                   const std::string& b);
+  // Simplifies an expression in the .mdl language. Returns "0" after reporting an error.
   std::string tidy(const Origin& line, const Token& token, const std::string& text);
-  // Evaluates an expression with the initial values of the parameters.
-  double value(const std::string& text) const;
+  // Evaluates an expression with the initial values of the parameters, times a factor.
+  double value(const std::string& text, double factor = 1.0) const;
   bool is_number_name(const std::string& name) const { return lines_.contains(name); }
 
   bool is_full() const { return count_.is_full(); }
@@ -72,15 +102,38 @@ class SamLines {
   std::vector<Diagnostic> diagnostics;
 
  private:
-  std::string expression(const Origin& line, const Token& token, int depth);
-  std::string named(const Origin& line, const Token& name, int depth);
+  struct Cursor;
+  using Value = std::optional<SamSignals>;
+
+  void define_parameters();
+  Value chain(Cursor& at, bool in_list = true);
+  Value list(Cursor& at);
+  Value sum(Cursor& at);
+  Value product(Cursor& at);
+  Value power(Cursor& at);
+  Value primary(Cursor& at);
+  Value word(Cursor& at);
+  Value call(Cursor& at, const Token& name, std::vector<SamSignals> arguments);
+  std::optional<std::vector<SamSignals>> arguments_of(Cursor& at);
+  Value slider(Cursor& at, const Token& word);
+  Value defined(Cursor& at, const Token& name, std::vector<SamSignals> arguments);
+  Value table(Cursor& at, const Token& name);
+  std::string entry(const Origin& line, const Token& token, const SamSignals& list,
+                    const std::string& index);
+  std::string fixed(const Origin& line, const Token& token, double value);
+  Value combined(const Cursor& at, const Token& sign, const Value& left, const Value& right);
+  static bool is_reserved(std::string_view name);
+  std::nullopt_t refuse(const Cursor& at, std::string message);
   void read_line(std::string_view line, int number);
   void read_definition(const Origin& origin, const Token& rest);
   bool read_end(const Origin& origin, Token& rest);
-  bool read_slider(const Origin& origin, const Token& token, double& start);
 
-  std::map<std::string, SamDefinition> lines_;  // definitions by name
-  std::size_t spent_ = 0;                       // total bytes of expressions
+  std::map<std::string, SamDefinition, std::less<>> lines_;  // definitions by name
+  std::vector<std::string> order_;                           // names, in order of their lines
+  std::map<std::pair<int, int>, std::string> sliders_;       // parameters by line and column
+  const Listen* listen_ = nullptr;
+  std::set<std::string, std::less<>> left_out_;  // functions that have caused a warning
+  std::size_t spent_ = 0;                        // total bytes of expressions
   DiagnosticCount count_;
 };
 

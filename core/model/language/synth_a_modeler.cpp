@@ -47,26 +47,6 @@ struct SamElement {
   std::vector<std::size_t> guides;  // waveguides that end here; terminations and junctions only
 };
 
-// The signal of an audioout: a sum of elements, each times an expression ("": 1), or an expression
-// without elements.
-struct SamSignal {
-  struct Part {
-    std::size_t element = 0;
-    std::string level;
-  };
-  std::vector<Part> parts;
-  std::string number;
-
-  bool is_number() const { return parts.empty(); }
-  // Surrounds each of its expressions with these.
-  void wrap(const std::string& before, const std::string& behind) {
-    for (Part& part : parts) {
-      part.level = before + (part.level.empty() ? "1" : part.level) + behind;
-    }
-    number = before + number + behind;
-  }
-};
-
 // Translates one text.
 class SamTranslator {
  public:
@@ -78,7 +58,9 @@ class SamTranslator {
   std::string label_of(const SamElement& element) const;
   void name_ends();
   void join_guides();
+  bool is_place(const SamElement& node);
   void join_row(std::size_t termination);
+  void join_knot(std::size_t junction, const std::string& string, const std::string& impedance);
   std::optional<std::string> period_of(const SamElement& guide);
   // Loss of a wave at a termination: `flat` for all partials, plus pi^2/6 (frequency/fc)^2, the
   // loss of a moving average well below its first zero.
@@ -94,16 +76,20 @@ class SamTranslator {
   std::string like(std::string_view name) const;
   void write_link(const SamElement& element);
   void write_output(const SamElement& element);
-  std::optional<SamSignal> sum(const SamElement& out, Token& rest, int depth);
-  std::optional<SamSignal> product(const SamElement& out, Token& rest, int depth);
-  std::optional<SamSignal> factor(const SamElement& out, Token& rest, int depth);
+  std::optional<SamSignal> heard(const SamElement& out, const Token& name);
+  std::optional<SamSignal> force_of(const SamElement& link);
+  std::string hand_at(const SamElement& pluck, std::size_t side);
+  std::string unique(std::string label) const;
 
+  // Returns an argument; 0 if it is missing.
   std::string number(const SamElement& element, std::size_t at) {
-    return lines_.expression(element.statement->origin, element.statement->arguments[at]);
+    return at >= element.statement->arguments.size()
+               ? "0"
+               : lines_.expression(element.statement->origin, element.statement->arguments[at]);
   }
   std::string scaled(const SamElement& element, std::size_t at, const std::string& factor) {
-    return lines_.tidy(element.statement->origin, element.statement->arguments[at],
-                       factor + "*(" + number(element, at) + ")");
+    return lines_.join(element.statement->origin, element.statement->word, factor, '*',
+                       number(element, at));
   }
   // Reads a number without parameters.
   std::string fixed(const SamElement& element, std::size_t at) {
@@ -131,6 +117,8 @@ class SamTranslator {
   std::vector<bool> joined_;  // [element] a waveguide that is part of a row
   int ports_ = 0;
   int outputs_ = 0;
+  bool has_one_ = false;    // the ground at 1, for constant outputs
+  bool has_pluck_ = false;  // a warning has been given
   Translation out_;
 };
 
@@ -139,18 +127,27 @@ constexpr double pluck_peak = 0.09;
 
 constexpr std::size_t longest_name = 900;  // bytes
 
+// The running mean of a termination has at most 256 samples.
+constexpr double lowest_fc = 44100.0 / 256.0;
+
+// Stiffness of the links that tie waveguides to one junction, in impedances per sample.
+constexpr std::string_view tie_stiffness = "1000";
+
 constexpr SamShape shapes[] = {
-    {"mass", SamKind::mass, 3, 3, 1, "mass(m,x0,v0),id;"},
-    {"ground", SamKind::ground, 1, 1, 1, "ground(x),id;"},
+    {"mass", SamKind::mass, 1, 3, 1, "mass(m,x0,v0),id;"},
+    {"ground", SamKind::ground, 0, 1, 1, "ground(x),id;"},
     {"port", SamKind::port, 0, 0, 1, "port(),id;"},
     {"resonators", SamKind::resonators, 3, 3000, 1, "resonators(f,tau,m, f,tau,m, ...),id;"},
     {"resonator", SamKind::resonators, 3, 3, 1, "resonator(f,tau,m),id;"},
-    {"link", SamKind::link, 3, 3, 3, "link(k,R,o),id,a,b;"},
-    {"touch", SamKind::touch, 3, 3, 3, "touch(k,R,o),id,a,b;"},
-    {"pluck", SamKind::pluck, 4, 4, 3, "pluck(k,R,halfWidth,o),id,a,b;"},
+    {"link", SamKind::link, 2, 3, 3, "link(k,R,o),id,a,b;"},
+    {"touch", SamKind::touch, 2, 3, 3, "touch(k,R,o),id,a,b;"},
+    {"pulseTouch", SamKind::touch, 3, 6, 3, "pulseTouch(k,R,o,multiplier,tau,length),id,a,b;"},
+    {"pulseTouchTable", SamKind::touch, 3, 8, 3, "pulseTouchTable(k,R,o,...),id,a,b;"},
+    {"pulseTouchGeneral", SamKind::touch, 3, 8, 3, "pulseTouchGeneral(k,R,o,...),id,a,b;"},
+    {"pluck", SamKind::pluck, 3, 4, 3, "pluck(k,R,halfWidth,o),id,a,b;"},
     {"waveguide", SamKind::waveguide, 2, 2, 3, "waveguide(Z0,simpleString(maxT,T)),id,left,right;"},
     {"termination", SamKind::termination, 1, 1, 1, "termination(simpleStringTerm(r,fc)),id;"},
-    {"junction", SamKind::junction, 1, 1, 1, "junction(height),id;"},
+    {"junction", SamKind::junction, 0, 1, 1, "junction(height),id;"},
     {"audioout", SamKind::audioout, 1, 1, 1, "audioout,id,signal;"},
 };
 
@@ -160,17 +157,6 @@ bool is_channel(std::string_view name) {
   return start < name.size() && name.find_first_not_of("0123456789", start) == name.npos;
 }
 
-constexpr int deepest_sum = 50;  // nested parentheses and signs
-constexpr std::size_t longest_levels = 10 * longest_expression;
-
-std::size_t length_of(const SamSignal& heard) {
-  std::size_t length = heard.number.size();
-  for (const SamSignal::Part& part : heard.parts) {
-    length += part.level.size();
-  }
-  return length;
-}
-
 Translation SamTranslator::translate(std::string_view text, const Progress& progress) {
   progress.stage("reading it");
   lines_.read(text, progress);
@@ -178,10 +164,6 @@ Translation SamTranslator::translate(std::string_view text, const Progress& prog
   name_ends();
   join_guides();
   add_forces();
-  for (std::size_t i = 0; i < lines_.parameters.size(); ++i) {
-    emit(lines_.parameter_lines[i],
-         "@" + lines_.parameters[i] + " param " + print_number(lines_.values[i]));
-  }
   for (const SamElement& element : elements_) {
     if (lines_.is_full()) {
       break;
@@ -189,6 +171,13 @@ Translation SamTranslator::translate(std::string_view text, const Progress& prog
     write(element);
     progress.spend(20);
   }
+  const Translation elements = std::exchange(out_, {});
+  for (std::size_t i = 0; i < lines_.parameters.size(); ++i) {
+    emit(lines_.parameter_lines[i],
+         "@" + lines_.parameters[i] + " param " + print_number(lines_.values[i]));
+  }
+  out_.text += elements.text;
+  out_.origins.insert(out_.origins.end(), elements.origins.begin(), elements.origins.end());
   out_.diagnostics = std::move(lines_.diagnostics);
   return std::move(out_);
 }
@@ -217,7 +206,7 @@ void SamTranslator::declare() {
 // Declares an element. Returns false after reporting an error.
 bool SamTranslator::declare(const Statement& statement) {
   const std::string_view word = statement.word.text;
-  if (word == "controladjust" || word == "display") {
+  if (word.ends_with("adjust") || word == "display") {
     lines_.warning(statement.origin, statement.word,
                    "ignored: " + quoted(word) + " is not supported; sliders become parameters");
     return false;
@@ -227,9 +216,7 @@ bool SamTranslator::declare(const Statement& statement) {
   if (shape == std::end(shapes)) {
     lines_.error(statement.origin, statement.word,
                  quoted(word) + " is not supported: " +
-                     (word.starts_with("pulseTouch")
-                          ? "write a touch, or convert the model and strike it by a force input"
-                      : word.ends_with("link") || word == "detent"
+                     (word.ends_with("link") || word == "detent"
                           ? "write a link or a touch"
                           : "Synth-A-Modeler has no such element either"));
     return false;
@@ -255,6 +242,14 @@ std::string SamTranslator::label_of(const SamElement& element) const {
   const std::string_view name = element.statement->names[0].text;
   std::string label = "@" + std::string(name);
   while (is_channel(name) && by_name_.contains(std::string_view(label).substr(1))) {
+    label += "_";
+  }
+  return label;
+}
+
+// Returns a label that no element has.
+std::string SamTranslator::unique(std::string label) const {
+  while (by_name_.contains(std::string_view(label).substr(1))) {
     label += "_";
   }
   return label;
@@ -359,20 +354,18 @@ void SamTranslator::write_resonators(const SamElement& element) {
   const std::string first = number(element, 2);
   for (std::size_t at = 0; at + 2 < element.statement->arguments.size(); at += 3) {
     const Token& own = element.statement->arguments[at + 2];
-    std::string shape = "1";
-    if (at > 0 && number(element, at + 2) != first) {
-      shape = lines_.tidy(origin, own, "sqrt((" + first + ")/(" + number(element, at + 2) + "))");
-      double constant = 0.0;
-      if (!parse_number(shape, constant)) {
-        return error(element, own, "the ratio of the masses of these resonators must be a number");
-      }
+    const std::string ratio =
+        lines_.tidy(origin, own, "sqrt((" + first + ")/(" + number(element, at + 2) + "))");
+    const double start = lines_.value(ratio);
+    constexpr double tiny = 1e-9;
+    if (!(std::fabs(lines_.value(ratio, 1.5) - start) < tiny * start)) {
+      lines_.warning(origin, own,
+                     "the ratio of the masses of these resonators stays as it is at the start");
     }
-    std::string mode = label + "_" + std::to_string(at / 3 + 1);
-    while (by_name_.contains(mode.substr(1))) {
-      mode += "_";
-    }
-    emit(origin, mode + " mode " + label + " " + number(element, at) + " " +
-                     scaled(element, at + 1, "6.907755278982137") + " " + shape);
+    const std::string shape = print_number(start);
+    emit(origin, unique(label + "_" + std::to_string(at / 3 + 1)) + " mode " + label + " " +
+                     number(element, at) + " " + scaled(element, at + 1, "6.907755278982137") +
+                     " " + shape);
   }
 }
 
@@ -406,7 +399,7 @@ void SamTranslator::write_link(const SamElement& element) {
                    "expected a mass, a ground, a port, resonators or a junction, found " +
                        quoted(name.text));
     }
-    ends += " " + end.end;
+    ends += " " + (element.shape->kind == SamKind::pluck ? hand_at(element, side) : end.end);
   }
   const std::string label = label_of(element);
   const std::string damping = scaled(element, 1, "44100");
@@ -415,21 +408,55 @@ void SamTranslator::write_link(const SamElement& element) {
       return emit(statement.origin,
                   label + " spring" + ends + " " + number(element, 0) + " " + damping);
     case SamKind::touch:  // acts for x_a - x_b > o; a contact, for d > -t
+      if (statement.word.text != "touch") {
+        lines_.warning(statement.origin, statement.word,
+                       "converted to a touch: the pulse at its start is left out");
+      }
       return emit(statement.origin, label + " contact" + ends + " " + number(element, 0) + " " +
                                         damping + " " + scaled(element, 2, "-1"));
     default:
       break;
   }
-  if (number(element, 3) != "0") {
-    return error(element, statement.arguments[3],
-                 "a pluck's offset is not supported: it must be 0");
+  if (!has_pluck_) {
+    lines_.warning(statement.origin, statement.word,
+                   "plucks become nlPlucks with the same reach and maximum force: they act within "
+                   "halfWidth before the ends meet, not up to halfWidth after");
   }
-  lines_.warning(statement.origin, statement.word,
-                 "converted to an nlPluck with the same reach and maximum force: it acts within "
-                 "halfWidth before the ends meet, not up to halfWidth after");
+  has_pluck_ = true;
   emit(statement.origin, label + " nlPluck" + ends + " " +
                              scaled(element, 0, print_number(1.0 / pluck_peak)) + " " +
                              number(element, 2) + " " + damping);
+}
+
+// Returns the end of a pluck. With an offset, its port or ground is replaced by a mass that follows
+// it at this distance: too heavy for a string to move, on a spring that is damped critically.
+std::string SamTranslator::hand_at(const SamElement& pluck, std::size_t side) {
+  const Statement& statement = *pluck.statement;
+  const std::string offset = number(pluck, 3);
+  const auto kind = [&](std::size_t end) {
+    return elements_[by_name_.find(statement.names[end].text)->second].shape->kind;
+  };
+  const auto is_hand = [&](std::size_t end) {
+    return by_name_.contains(statement.names[end].text) &&
+           (kind(end) == SamKind::port || kind(end) == SamKind::ground);
+  };
+  const std::string& end = elements_[by_name_.find(statement.names[side].text)->second].end;
+  if (offset == "0" || (side == 1 ? !is_hand(1) : is_hand(1) || !is_hand(2))) {
+    if (offset != "0" && side == 2 && !is_hand(1)) {
+      lines_.warning(statement.origin, statement.arguments[3],
+                     "left out: an offset between two ends that move");
+    }
+    return end;
+  }
+  const std::string shift = lines_.tidy(statement.origin, statement.arguments[3],
+                                        (side == 1 ? "-(" : "(") + offset + ")");
+  const std::string hand = unique(label_of(pluck) + "_hand");
+  emit(statement.origin,
+       hand + " osc 1e11 0 1.9e10 " +
+           lines_.tidy(statement.origin, statement.word, "-4.41e13*(" + shift + ")") + " " +
+           print_number(lines_.value(shift)) + " 0");
+  emit(statement.origin, unique(label_of(pluck) + "_arm") + " spring " + hand + " " + end + " 1e9");
+  return hand;
 }
 
 // --- waveguides in a row -------------------------------------------------------------------------
@@ -482,19 +509,30 @@ std::optional<SamTranslator::Loss> SamTranslator::loss_of(const SamElement& term
   if (parse_number(reflection, constant)) {
     loss.flat = print_number(-std::log(std::fabs(r)));
   } else {
-    // The series of -ln r in (1-r)/(1+r), which is small for a reflection near 1.
+    // -ln r = n asinh((r^(-1/n) - r^(1/n))/2), which is that half for a large n.
     const std::string size = "min(abs(" + reflection + "),1)";
-    const std::string ratio = "((1-" + size + ")/(1+" + size + "))";
-    loss.flat = "2*" + ratio + "+2/3*pow(" + ratio + ",3)";
+    loss.flat =
+        lines_.tidy(origin, parts[0], "512*(pow(" + size + ",-1/1024)-pow(" + size + ",1/1024))");
   }
   if (is_simple) {
     loss.fc = lines_.expression(origin, parts[1]);
+    if (lines_.value(loss.fc) > 0.0 && lines_.value(loss.fc) < lowest_fc) {
+      loss.fc =
+          lines_.tidy(origin, parts[1], "max(" + loss.fc + "," + print_number(lowest_fc) + ")");
+    }
     if (!(lines_.value(loss.fc) > 0.0)) {
       error(termination, parts[1], "fc must be above 0 Hz");
       return std::nullopt;
     }
   }
   return loss;
+}
+
+// Returns whether a junction only marks a place on a string of two waveguides. Any other junction
+// is a knot, where strings end.
+bool SamTranslator::is_place(const SamElement& node) {
+  return node.guides.size() == 2 && scaled(elements_[node.guides[0]], 0, "44100") ==
+                                        scaled(elements_[node.guides[1]], 0, "44100");
 }
 
 // Joins the waveguides between two terminations to one, with the junctions as places on it.
@@ -526,11 +564,9 @@ void SamTranslator::join_guides() {
       error(node, name,
             "a termination ends one waveguide, but this one ends " + std::to_string(count));
       is_right = false;
-    } else if (node.shape->kind == SamKind::junction && count != 2) {
-      error(node, name,
-            "a junction joins two waveguides, but this one joins " + std::to_string(count) +
-                (count > 2 ? "; connect junctions of two by a stiff link instead" : ""));
-      is_right = false;
+    } else if (node.shape->kind == SamKind::junction && count == 0) {
+      lines_.warning(node.statement->origin, name,
+                     "left out: " + quoted(name.text) + " joins no waveguide");
     }
   }
   for (std::size_t i = 0; is_right && i < elements_.size(); ++i) {
@@ -541,7 +577,8 @@ void SamTranslator::join_guides() {
   for (std::size_t i = 0; is_right && i < elements_.size(); ++i) {
     if (elements_[i].shape->kind == SamKind::waveguide && !joined_[i]) {
       error(elements_[i], elements_[i].statement->word,
-            "this waveguide is in a ring: a row of them needs a termination at each end");
+            "this waveguide reaches no termination: it is in a ring, or between two junctions that "
+            "do not join two waveguides of one impedance");
       return;
     }
   }
@@ -580,7 +617,7 @@ void SamTranslator::join_row(std::size_t termination) {
           here, here.statement->arguments[0],
           "a row of waveguides must have one impedance, here " + impedance + " per sample");
     }
-    period = lines_.tidy(origin, word, period + "+" + *more);
+    period = lines_.join(origin, word, period, '+', *more);
     const auto by_name = [&](std::size_t side) {
       return by_name_.find(here.statement->names[side].text)->second;
     };
@@ -594,6 +631,15 @@ void SamTranslator::join_row(std::size_t termination) {
       break;
     }
     const std::string its_height = fixed(next, 0);
+    if (!is_place(next)) {
+      if (!places.empty()) {
+        return error(next, next.statement->names[0],
+                     "a junction of two waveguides of one impedance cannot be between " +
+                         quoted(next.statement->names[0].text) + " and a termination");
+      }
+      height = its_height;
+      break;
+    }
     if (!places.empty() && its_height != height) {
       return error(next, next.statement->arguments[0],
                    "the junctions of a row must have one height, here " + height);
@@ -608,200 +654,170 @@ void SamTranslator::join_row(std::size_t termination) {
       return;  // already reported
     }
   }
+  // A string that ends in a knot is half of a string of half the impedance. The knot is in its
+  // middle, and both halves move alike.
+  const bool is_half = !right;
+  if (is_half) {
+    right = left;
+    period = lines_.join(origin, word, "2", '*', period);
+  }
   if (left->is_free != right->is_free) {
     return error(elements_[node], elements_[node].statement->arguments[0],
                  "both ends of a row of waveguides must be fixed (reflection below 0) or both free "
                  "(above 0)");
   }
-  period = lines_.tidy(origin, word, period + "+" + delay(*right));
+  period = lines_.join(origin, word, period, '+', is_half ? "0" : delay(*right));
   if (!(lines_.value(period) > 0.0)) {
     return error(named, word, "the T of this row must be above 0 s");
   }
-  const std::string flat = left->flat + "+" + right->flat;
+  const auto join = [&](const std::string& a, char op, const std::string& b) {
+    return lines_.join(origin, word, a, op, b);
+  };
+  // The loss per period is flat + mean/period^2.
+  const std::string flat = join(left->flat, '+', right->flat);
   std::string mean = "0";
   for (const Loss* loss : {static_cast<const Loss*>(&*left), static_cast<const Loss*>(&*right)}) {
-    mean +=
-        loss->fc.empty() ? "" : "+1.6449340668482264/pow((" + loss->fc + ")*(" + period + "),2)";
+    if (!loss->fc.empty()) {
+      mean = join(mean, '+', join("1.6449340668482264", '/', join(loss->fc, '^', "2")));
+    }
   }
-  const std::string all = "max(" + flat + "+" + mean + ",1e-9)";  // ln of the loss per period
-  emit(origin, label + (left->is_free ? " openWaveguide " : " waveguide ") + impedance + " " +
-                   lines_.tidy(origin, word, "1/(" + period + ")") + " " +
-                   lines_.tidy(origin, word, "6.907755278982137*(" + period + ")/" + all) + " " +
-                   lines_.tidy(origin, word, "min(max((" + flat + ")/" + all + ",0),1)") + " " +
+  const std::string blur = join(mean, '/', join(period, '^', "2"));
+  const std::string all = join("max(" + flat + ",1e-9)", '+', blur);
+  const std::string r = is_half ? lines_.tidy(origin, word, "0.5*(" + impedance + ")") : impedance;
+  emit(origin, label + (left->is_free ? " openWaveguide " : " waveguide ") + r + " " +
+                   join("1", '/', period) + " " +
+                   join(join("6.907755278982137", '*', period), '/', all) + " " +
+                   join("1", '/', join("1", '+', join(blur, '/', "max(" + flat + ",1e-9)"))) + " " +
                    height);
   for (const auto& [junction, to] : places) {
-    elements_[junction].end =
-        "[" + label + " " + lines_.tidy(origin, word, "(" + to + ")/(" + period + ")") + "]";
+    elements_[junction].end = "[" + label + " " + join(to, '/', period) + "]";
   }
   elements_[termination].end = "[" + label + " 0]";
+  if (is_half) {
+    return join_knot(node, label, impedance);
+  }
   elements_[node].end = "[" + label + " 1]";
+}
+
+// Ties the middle of a string to the others of its junction.
+void SamTranslator::join_knot(std::size_t junction, const std::string& string,
+                              const std::string& impedance) {
+  SamElement& knot = elements_[junction];
+  const Statement& statement = *knot.statement;
+  const std::string middle = "[" + string + " 0.5]";
+  if (knot.end.empty()) {
+    knot.end = middle;
+    return;
+  }
+  emit(statement.origin, unique(string + "_tie") + " spring " + middle + " " + knot.end + " " +
+                             lines_.tidy(statement.origin, statement.word,
+                                         std::string(tie_stiffness) + "*(" + impedance + ")"));
 }
 
 // --- outputs -------------------------------------------------------------------------------------
 
-std::optional<SamSignal> SamTranslator::factor(const SamElement& out, Token& rest, int depth) {
-  const auto refuse = [&](const std::string& message) {
-    error(out, {rest.text.substr(0, 1), rest.column}, message);
+// Returns the signal of an element: its position, or the force of a link.
+std::optional<SamSignal> SamTranslator::heard(const SamElement& out, const Token& name) {
+  const auto found = by_name_.find(name.text);
+  if (found == by_name_.end() || elements_[found->second].shape->kind == SamKind::waveguide ||
+      elements_[found->second].shape->kind == SamKind::audioout) {
+    error(out, name,
+          found == by_name_.end()
+              ? "there is no element or number called " + quoted(name.text) + like(name.text)
+              : quoted(name.text) + " has no position");
     return std::nullopt;
-  };
-  const auto skip = [&](std::size_t count) {
-    rest = trimmed({rest.text.substr(count), rest.column + static_cast<int>(count)});
-  };
-  if (rest.text.starts_with('-') || rest.text.starts_with('+')) {
-    const bool is_negative = rest.text.starts_with('-');
-    if (depth >= deepest_sum) {
-      return refuse("too many signs in a row");
-    }
-    skip(1);
-    auto heard = factor(out, rest, depth + 1);
-    if (heard && is_negative) {
-      heard->wrap("-(", ")");
-    }
-    return heard;
   }
-  if (rest.text.starts_with('(')) {
-    if (depth >= deepest_sum) {
-      return refuse("the parentheses are nested too deeply");
-    }
-    skip(1);
-    auto inner = sum(out, rest, depth + 1);
-    if (inner && !rest.text.starts_with(')')) {
-      return refuse(
-          "expected ')': an output is a sum of signals times numbers; other FAUST code is not "
-          "supported");
-    }
-    if (inner) {
-      skip(1);
-    }
-    return inner;
+  const SamElement& element = elements_[found->second];
+  if (is_link(element.shape->kind)) {
+    return force_of(element);
   }
-  const std::size_t length =
-      is_identifier(rest.text.substr(0, 1)) ? word_length(rest.text) : number_length(rest.text);
-  const Token word{rest.text.substr(0, length), rest.column};
-  if (length == 0) {
-    return refuse("expected the name of an element or a number");
-  }
-  const auto found = by_name_.find(word.text);
-  SamSignal heard;
-  if (found == by_name_.end()) {
-    heard.number = "(" + lines_.expression(out.statement->origin, word) + ")";  // or an error
-  } else if (is_link(elements_[found->second].shape->kind) ||
-             elements_[found->second].shape->kind == SamKind::waveguide ||
-             elements_[found->second].shape->kind == SamKind::audioout) {
-    error(out, word,
-          quoted(word.text) +
-              " has no position: expected a mass, resonators, a junction, a termination or a port");
-    return std::nullopt;
-  } else {
-    heard.parts.push_back({found->second, ""});
-  }
-  skip(length);
-  return heard;
+  return SamSignal{.parts = {{.element = found->second, .level = "1"}}};
 }
 
-std::optional<SamSignal> SamTranslator::product(const SamElement& out, Token& rest, int depth) {
-  auto first = factor(out, rest, depth);
-  if (!first) {
-    return std::nullopt;
+// Returns the force of a link. Synth-A-Modeler computes it from the positions one sample before,
+// which are x - v, with velocities v - a. The force of a touch or a pluck is the whole force on one
+// of its ends, if nothing else acts there.
+std::optional<SamSignal> SamTranslator::force_of(const SamElement& link) {
+  SamSignal force;
+  std::size_t ends[2];
+  for (std::size_t side = 0; side < 2; ++side) {
+    const auto found = by_name_.find(link.statement->names[side + 1].text);
+    if (found == by_name_.end()) {
+      return std::nullopt;  // write_link reports it
+    }
+    ends[side] = found->second;
   }
-  SamSignal heard = std::move(*first);
-  while (rest.text.starts_with('*') || rest.text.starts_with('/')) {
-    const Token sign{rest.text.substr(0, 1), rest.column};
-    rest = trimmed({rest.text.substr(1), rest.column + 1});
-    auto next = factor(out, rest, depth);
-    if (!next) {
-      return std::nullopt;
-    }
-    if (!next->is_number() && (!heard.is_number() || sign.text == "/")) {
-      error(out, sign, "a signal may be multiplied by numbers, not by another signal");
-      return std::nullopt;
-    }
-    if (next->is_number()) {
-      heard.wrap("(", ")" + std::string(sign.text) + next->number);
-    } else {
-      next->wrap(heard.number + "*(", ")");
-      heard = std::move(*next);
-    }
-    if (length_of(heard) > longest_levels) {
-      error(out, sign, "too many factors in this output");
-      return std::nullopt;
-    }
-  }
-  return heard;
-}
-
-std::optional<SamSignal> SamTranslator::sum(const SamElement& out, Token& rest, int depth) {
-  std::optional<SamSignal> all;
-  bool is_taken_away = false;
-  for (;;) {
-    const Token place = rest;
-    auto heard = product(out, rest, depth);
-    if (!heard) {
-      return std::nullopt;
-    }
-    if (heard->is_number() && (depth == 0 || (all && !all->is_number()))) {
-      error(out, place, "expected a signal, found only a number");
-      return std::nullopt;
-    }
-    if (all && all->is_number() && !heard->is_number()) {
-      error(out, place, "expected a number: a signal cannot be added to numbers in parentheses");
-      return std::nullopt;
-    }
-    if (is_taken_away) {
-      heard->wrap("-(", ")");
-    }
-    if (all) {
-      all->parts.insert(all->parts.end(), heard->parts.begin(), heard->parts.end());
-      all->number += "+" + heard->number;
-    } else {
-      all = std::move(heard);
-    }
-    if (!rest.text.starts_with('+') && !rest.text.starts_with('-')) {
-      if (all->is_number()) {
-        all->number = "(" + all->number + ")";
+  if (link.shape->kind == SamKind::link) {
+    const std::string k = number(link, 0);
+    const std::string offset = number(link, 2);
+    const std::string r = scaled(link, 1, "44100");
+    const std::string levels[] = {k, r + "-(" + k + ")", "-(" + r + ")"};
+    for (std::size_t side = 0; side < 2; ++side) {
+      for (int derivative = 0; derivative < 3; ++derivative) {
+        const std::string level =
+            (side == 0 ? "" : "-(") + levels[derivative] + (side == 0 ? "" : ")");
+        force.parts.push_back(
+            {.element = ends[side],
+             .derivative = derivative,
+             .level = lines_.tidy(link.statement->origin, link.statement->word, level)});
       }
-      return all;
     }
-    is_taken_away = rest.text.starts_with('-');
-    rest = trimmed({rest.text.substr(1), rest.column + 1});
+    if (offset != "0") {
+      force.number = lines_.tidy(link.statement->origin, link.statement->word,
+                                 "-(" + k + ")*(" + offset + ")");
+    }
+    return force;
   }
+  for (const std::size_t side : {std::size_t{1}, std::size_t{0}}) {
+    const std::string_view end = link.statement->names[side + 1].text;
+    const auto links =
+        std::count_if(elements_.begin(), elements_.end(), [&](const SamElement& other) {
+          return is_link(other.shape->kind) &&
+                 (other.statement->names[1].text == end || other.statement->names[2].text == end);
+        });
+    if (links == 1 && elements_[ends[side]].guides.empty()) {
+      force.parts.push_back(
+          {.element = ends[side], .is_force = true, .level = side == 1 ? "1" : "-1"});
+      return force;
+    }
+  }
+  lines_.warning(link.statement->origin, link.statement->names[0],
+                 "left out of the outputs: the force of " + quoted(link.statement->names[0].text) +
+                     ", as other links act on both of its ends");
+  return SamSignal{};
 }
 
 void SamTranslator::write_output(const SamElement& element) {
   const Statement& statement = *element.statement;
-  Token rest = statement.arguments[0];
-  if (rest.text.size() > longest_expression) {
-    return error(element, rest, "this output is too long");
-  }
-  const auto heard = sum(element, rest, 0);
-  if (!heard) {
+  const Token& text = statement.arguments[0];
+  const auto signal =
+      lines_.signal(statement.origin, text, statement.names[0].text,
+                    [&](const Origin&, const Token& name) { return heard(element, name); });
+  if (!signal) {
     return;
   }
-  if (!rest.text.empty()) {
-    return error(element, rest,
-                 "found " + quoted(rest.text) +
-                     " where ';' was expected: other FAUST code is not supported");
-  }
-  const std::string name = quoted(statement.names[0].text);
-  const std::string output = "@out" + std::to_string(outputs_ + 1) + " posOutput ";
-  bool is_heard = false;
+  const std::string channel = "@out" + std::to_string(++outputs_);
   bool has_termination = false;
-  for (const SamSignal::Part& part : heard->parts) {
+  for (const SamSignal::Part& part : signal->parts) {
     const SamElement& source = elements_[part.element];
     has_termination = has_termination || source.shape->kind == SamKind::termination;
-    if (!source.end.empty()) {  // otherwise join_row has reported it
-      const std::string level =
-          part.level.empty()
-              ? ""
-              : " " + lines_.tidy(statement.origin, statement.arguments[0], part.level);
-      emit(statement.origin, output + source.end + level);
-      is_heard = true;
+    if (!source.end.empty() && part.level != "0") {  // otherwise join_row has reported it
+      constexpr const char* words[] = {" posOutput ", " velOutput ", " accOutput "};
+      emit(statement.origin, channel + (part.is_force ? " frcOutput " : words[part.derivative]) +
+                                 source.end + (part.level == "1" ? "" : " " + part.level));
     }
   }
-  outputs_ += is_heard ? 1 : 0;
+  if (signal->is_number() || signal->number != "0") {
+    const std::string one = unique("@one");
+    if (!has_one_) {
+      emit(statement.origin, one + " ground 1");
+    }
+    has_one_ = true;
+    emit(statement.origin, channel + " posOutput " + one + " " + signal->number);
+  }
   if (has_termination) {
     lines_.warning(statement.origin, statement.word,
-                   name +
+                   quoted(statement.names[0].text) +
                        " is taken one sample from the termination, where the position of the "
                        "string is proportional to the incoming wave");
   }

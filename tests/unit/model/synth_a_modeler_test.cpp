@@ -200,7 +200,7 @@ TEST_CASE("sliders and constants are parameters", "[synth_a_modeler]") {
 }
 
 TEST_CASE("errors in Synth-A-Modeler files have a line", "[synth_a_modeler]") {
-  check_error("mass(1.0,0.0),m;\n", 1, 1, "expected mass(m,x0,v0),id;, found 2 arguments");
+  check_error("mass(1.0,0.0,0.0,0.0),m;\n", 1, 1, "expected mass(m,x0,v0),id;, found 4 arguments");
   check_error("mass(1.0,0.0,0.0),m\n", 1, 20, "the line ends where a ';' was expected");
   check_error("# a\n\nmass(1.0,0.0,0.0,m;\n", 3, 5, "this ( is never closed");
   check_error("port(),p;\nmas(1.0,0.0,0.0),m;\n", 2, 1,
@@ -208,30 +208,18 @@ TEST_CASE("errors in Synth-A-Modeler files have a line", "[synth_a_modeler]") {
   check_error("mass(1.0,0.0,0.0),m;\nlink(1.0,0.0,0.0),l,m,n;\n", 2, 23,
               "there is no element called 'n'; did you mean 'm'?");
   check_error("ground(0.0),g;\nground(0.0),g;\n", 2, 13, "'g' is already declared in line 1");
-  check_error(
-      "mass(1.0,0.0,0.0),m;\npulseTouch(1.0,0.0,0.0,1.0,1.0,1.0),t,m,m;\n", 2, 1,
-      "'pulseTouch' is not supported: write a touch, or convert the model and strike it by a "
-      "force input");
-  check_error("faustcode: eq=highpass(4,20.0);\nport(),p;\n", 1, 15,
+  check_error("faustcode: eq=highpass(4,20.0);\nmass(eq,0.0,0.0),m;\n", 1, 15,
               "found 'highpass' where a number, a slider or a constant was expected; other FAUST "
               "code is not supported");
-  check_error("faustcode: a=b*2.0;\nfaustcode: b=a+1.0;\nport(),p;\n", 2, 14,
+  check_error("faustcode: a=b*2.0;\nfaustcode: b=a+1.0;\nmass(a,0.0,0.0),m;\n", 2, 14,
               "'a' is defined in terms of itself");
-  check_error("port(),p;\naudioout,a,p:lowpass(1,100.0);\n", 2, 13,
-              "found ':lowpass(1,100.0)' where ';' was expected: other FAUST code is not "
-              "supported");
   std::string odd = string_of_two;
   odd.replace(odd.find("w1,j,fret"), 9, "w1,j,j");
   CHECK_FALSE(parse_network(odd).ok());
-  odd = string_of_two;
-  odd.replace(odd.find("0.5,simpleString(0.02,0.003"), 3, "0.7");
-  check_error(odd, 4, 11, "a row of waveguides must have one impedance, here 22050 per sample");
-  check_error(string_of_two +
-                  "termination(memorylessStringTerm(-0.9)),t;\n"
-                  "waveguide(0.5,simpleString(0.02,0.002)),w2,t,j;\n",
-              7, 15,
-              "a junction joins two waveguides, but this one joins 3; connect "
-              "junctions of two by a stiff link instead");
+  check_error(
+      "waveguide(0.5,simpleString(0.02,0.002)),w,j,j;\njunction(0.0),j;\naudioout,a,j;\n", 1, 1,
+      "this waveguide reaches no termination: it is in a ring, or between two junctions that do "
+      "not join two waveguides of one impedance");
 }
 
 TEST_CASE("approximate translations cause a warning", "[synth_a_modeler]") {
@@ -278,9 +266,10 @@ TEST_CASE("output expressions are translated", "[synth_a_modeler]") {
   CHECK(levels("(1.0+2.0)*(a+b*(s-1.0))") == 15.0);
   CHECK(levels("2.0*-a+b") == 0.0);
   CHECK(levels("a+a") == 2.0);
-  check_error("port(),p;\naudioout,a,p+1.0;\n", 2, 14, "expected a signal, found only a number");
-  check_error("port(),p;\naudioout,a,(1.0+p)*2.0;\n", 2, 17,
-              "expected a number: a signal cannot be added to numbers in parentheses");
+  CHECK(levels("(1.0+a)*2.0-2.0") == 2.0);
+  CHECK(levels("a:*(4.0):_") == 4.0);
+  CHECK(levels("a*(2.0):+(0.0):*(s)+b") == 8.0);
+  CHECK(levels("a*2.0^s") == 8.0);
   check_error("port(),p;\naudioout,a,p*p;\n", 2, 13,
               "a signal may be multiplied by numbers, not by another signal");
 }
@@ -359,19 +348,14 @@ TEST_CASE("damaged texts do not crash the translator", "[synth_a_modeler]") {
     CHECK_FALSE(parse_network("mass(" + nest + ",0.0,0.0),m;\n").ok());
     CHECK_FALSE(parse_network("port(),p;\naudioout,a," + nest + "q;\n").ok());
   }
-  std::string sum = "p";
-  std::string product = "1";
-  for (int i = 0; i < 1600; ++i) {
-    sum += "+p";
-    product += "*1";
-  }
-  CHECK_FALSE(parse_network("port(),p;\naudioout,a,(" + sum + ")*" + product + ";\n").ok());
   std::string doubling = "faustcode: x0=y;\nfaustcode: y=hslider(\"\",1,0,1,1);\n";
   for (int i = 1; i < 45; ++i) {
     const std::string before = "x" + std::to_string(i - 1);
     doubling += "faustcode: x" + std::to_string(i) + "=" + before + "+" + before + ";\n";
   }
-  CHECK_FALSE(parse_network(doubling).ok());
+  // An expression that is too long keeps its value at the start.
+  const Network doubled = network_of(doubling + "mass(x44,0.0,0.0),m;\naudioout,a,m;\n");
+  CHECK(value_of(doubled, doubled.masses[0].mass) == std::ldexp(1944810000.0, 44));
 }
 
 }  // namespace ressort::synth_a_modeler_test
