@@ -232,8 +232,9 @@ const Voice* Keyboard::replace_voices_of(int key, std::uint8_t channel, double v
 }
 
 void Keyboard::invert(Voice& voice) const {
+  constexpr double ramp_s = 0.006;  // both cancel until then
   voice.strength = -voice.strength;
-  voices.ramp_volume(voice, level_of(voice));
+  voices.ramp_volume(voice, level_of(voice), ramp_s);
 }
 
 void Keyboard::damp_keyless(Voice& voice) const {

@@ -11,7 +11,6 @@ namespace {
 constexpr double steal_fade_s = 0.005;  // fade of a stolen voice
 constexpr double level_memory_s = 0.1;  // release time constant of a voice's level
 constexpr double quiet_s = 0.5;         // longer than half a period of the lowest sound
-constexpr double volume_ramp_s = 0.02;
 constexpr double damper_on_s = 0.005;    // time constant with which a damper engages
 constexpr double inaudible_gain = 1e-6;  // a damped voice below this gain ends
 
@@ -166,15 +165,15 @@ void Voices::damp(Voice& voice, double share) const {
   voice.decay.kept_goal = std::pow(10.0, -decades_of_t60 * per_s / rate_hz_);
 }
 
-void Voices::ramp_volume(Voice& voice, const SideGains& level) const {
-  ramp_volume(voice, level, static_cast<std::size_t>(std::max(1.0, volume_ramp_s * rate_hz_)));
+void Voices::ramp_volume(Voice& voice, const SideGains& level, double seconds) const {
+  set_ramp(voice, level, static_cast<std::size_t>(std::max(1.0, seconds * rate_hz_)));
 }
 
 void Voices::follow_volume(Voice& voice, const SideGains& level) const {
-  ramp_volume(voice, level, std::max(max_block_frames, voice.volume_frames));
+  set_ramp(voice, level, std::max(max_block_frames, voice.volume_frames));
 }
 
-void Voices::ramp_volume(Voice& voice, const SideGains& level, std::size_t frames) {
+void Voices::set_ramp(Voice& voice, const SideGains& level, std::size_t frames) {
   for (std::size_t side = 0; side < level.size(); ++side) {
     voice.volume_step[side] =
         (voice.strength * level[side] - voice.volume[side]) / static_cast<double>(frames);

@@ -158,8 +158,8 @@ class Voices {
 
   // Sets the damper: `share` of it lies on the voice.
   void damp(Voice& voice, double share) const;
-  // Ramps the volume to strength * `level` within 20 ms.
-  void ramp_volume(Voice& voice, const SideGains& level) const;
+  // Ramps the volume to strength * `level`.
+  void ramp_volume(Voice& voice, const SideGains& level, double seconds = 0.02) const;
   // Ramps it within one block, or to the end of the current ramp.
   void follow_volume(Voice& voice, const SideGains& level) const;
   // Compares a new voice with an earlier one of its key from now on; see Mixing::compare().
@@ -209,7 +209,7 @@ class Voices {
 
  private:
   void free(Voice& voice);
-  static void ramp_volume(Voice& voice, const SideGains& level, std::size_t frames);
+  static void set_ramp(Voice& voice, const SideGains& level, std::size_t frames);
   std::size_t count_excess(std::size_t more) const;
 
   const Playing& playing_;
