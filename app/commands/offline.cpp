@@ -277,6 +277,10 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
   if (!midi) {
     return midi.error();
   }
+  if (options.is_strict && !midi->warnings.empty()) {
+    return Error{midi->warnings.front() + "; --strict refuses damaged files"};
+  }
+  scene->warnings.insert(scene->warnings.end(), midi->warnings.begin(), midi->warnings.end());
   const auto changes = std::count_if(midi->messages.begin(), midi->messages.end(),
                                      [&](const MidiFile::Message& message) {
                                        return (midi->bytes_of(message)[0] & 0xf0) == 0xc0;
@@ -433,6 +437,11 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
   rendered.rms =
       frame > 0 ? std::sqrt(energy / static_cast<double>(frame * rendered.channels)) : 0.0;
   rendered.resets = process.meters().resets;
+  if (const std::uint64_t wrong = process.meters().malformed; wrong > 0) {
+    rendered.warnings.push_back(options.midi + ": ignored " +
+                                counted(wrong, "message", "messages") +
+                                " with a wrong length or checksum");
+  }
   return rendered;
 }
 

@@ -7,8 +7,6 @@
 namespace ressort::realtime {
 namespace {
 
-constexpr std::size_t dump_head = 21;  // bytes before the keys of a bulk dump
-
 // Returns the number of data bytes after a status byte; 0 for ignored messages.
 int data_bytes(std::uint8_t status) {
   switch (status & 0xf0) {
@@ -122,39 +120,44 @@ double MidiReader::release_velocity(std::uint8_t channel, std::uint8_t byte) {
 // channels of an octave tuning are ignored, because there is only one tuning.
 //   7f device 08 02 program count (key semitone fraction fraction)...     sounding notes too
 //   7e device 08 01 program name[16] (semitone fraction fraction)[128] checksum
+//   08 07 (also 7e: new notes only) and 08 04: the same with a bank before the program
 //   7f device 08 08 channels[3] cents[12], or 08 09 with 14 bits each     sounding notes too;
 //   7e: new notes only
 void MidiReader::end_exclusive() {
-  constexpr std::size_t change_head = 6;
-  constexpr std::size_t dump_size = dump_head + std::size_t{3} * 128 + 1;
   const auto& bytes = exclusive_;
   const std::size_t size = exclusive_size_;
   const auto begins = [&](std::uint8_t kind, std::uint8_t what) {
-    return size >= change_head && bytes[0] == kind && bytes[2] == 0x08 && bytes[3] == what;
+    return size >= 6 && bytes[0] == kind && bytes[2] == 0x08 && bytes[3] == what;
   };
-  const bool is_change = begins(0x7f, 0x02);
-  is_dump_ = begins(0x7e, 0x01);
+  const bool has_bank = bytes[3] == 0x07 || bytes[3] == 0x04;
+  const bool is_change = begins(0x7f, 0x02) || begins(0x7f, 0x07) || begins(0x7e, 0x07);
+  is_dump_ = begins(0x7e, 0x01) || begins(0x7e, 0x04);
+  retunes_ = bytes[0] == 0x7f;
+  const std::size_t bank = has_bank ? 1 : 0;
+  const std::size_t change_head = 6 + bank;
+  dump_head_ = 21 + bank;  // bytes before the keys
+  const std::size_t dump_size = dump_head_ + std::size_t{3} * 128 + 1;
   constexpr std::size_t octave_head = 7;
   const bool is_octave = size >= octave_head && (bytes[0] == 0x7e || bytes[0] == 0x7f) &&
                          bytes[2] == 0x08 && (bytes[3] == 0x08 || bytes[3] == 0x09);
   octave_bytes_ = is_octave ? bytes[3] - 7 : 0;
   bool is_right = size <= longest_exclusive;
   if (is_change) {
-    is_right = is_right && size == change_head + std::size_t{4} * bytes[5];
+    is_right = is_right && size == change_head + std::size_t{4} * bytes[change_head - 1];
     tuned_next_ = change_head;
     tuned_end_ = size;
   } else if (is_dump_) {
     // XOR of all bytes before it, as the standard says.
     const auto sum = [&] {
-      return std::accumulate(bytes.begin(), bytes.begin() + dump_size - 1, std::uint8_t{0},
-                             std::bit_xor<>());
+      return std::accumulate(bytes.begin(),
+                             bytes.begin() + static_cast<std::ptrdiff_t>(dump_size) - 1,
+                             std::uint8_t{0}, std::bit_xor<>());
     };
     is_right = is_right && size == dump_size && (sum() & 0x7f) == bytes[dump_size - 1];
-    tuned_next_ = dump_head;
+    tuned_next_ = dump_head_;
     tuned_end_ = dump_size - 1;
   } else if (is_octave) {
     is_right = size == octave_head + 12 * static_cast<std::size_t>(octave_bytes_);
-    is_dump_ = bytes[0] == 0x7e;
     tuned_next_ = 0;  // keys
     tuned_end_ = 128;
   }
@@ -171,7 +174,7 @@ bool MidiReader::next_tuned_key(Event& event) {
     return next_key_of_octave(event);
   }
   while (tuned_next_ < tuned_end_) {
-    const std::size_t row = is_dump_ ? (tuned_next_ - dump_head) / 3 : 0;
+    const std::size_t row = is_dump_ ? (tuned_next_ - dump_head_) / 3 : 0;
     const auto key = static_cast<std::uint16_t>(is_dump_ ? row : exclusive_[tuned_next_++]);
     const int semitone = exclusive_[tuned_next_];
     const int fraction = exclusive_[tuned_next_ + 1] << 7 | exclusive_[tuned_next_ + 2];
@@ -182,7 +185,7 @@ bool MidiReader::next_tuned_key(Event& event) {
     event = {.kind = EventKind::key_tuning,
              .index = key,
              .value = 440.0 * std::exp2((semitone - 69 + fraction / 16384.0) / 12.0),
-             .value2 = is_dump_ ? 0.0 : 1.0};
+             .value2 = retunes_ ? 1.0 : 0.0};
     return true;
   }
   return false;
@@ -201,7 +204,7 @@ bool MidiReader::next_key_of_octave(Event& event) {
   event = {.kind = EventKind::key_tuning,
            .index = static_cast<std::uint16_t>(key),
            .value = 440.0 * std::exp2((key - 69 + cents / 100.0) / 12.0),
-           .value2 = is_dump_ ? 0.0 : 1.0};
+           .value2 = retunes_ ? 1.0 : 0.0};
   return true;
 }
 

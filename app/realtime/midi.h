@@ -57,7 +57,9 @@ class MidiReader {
   std::size_t exclusive_size_ = 0;
   std::size_t tuned_next_ = 0;  // position of the next key of a tuning message in `exclusive_`
   std::size_t tuned_end_ = 0;   // end of the keys
-  bool is_dump_ = false;        // a bulk dump: all keys from 0, for new notes only
+  std::size_t dump_head_ = 0;   // bytes before the keys of a bulk dump
+  bool is_dump_ = false;        // a bulk dump: all keys from 0
+  bool retunes_ = false;        // sounding notes too
   int octave_bytes_ = 0;        // bytes for each key of an octave tuning; 0: another message
   std::uint64_t malformed_ = 0;
 };

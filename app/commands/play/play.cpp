@@ -65,6 +65,9 @@ class Player {
         return exit_code::wrong_use;
       }
       song = *std::move(read);
+      for (const std::string& warning : song->warnings) {
+        complain("warning: " + warning);
+      }
       options_.midi = PlayOptions().midi;
     }
     if (is_flight_name(options_.name)) {

@@ -5,8 +5,11 @@
 #include <bitset>
 #include <cctype>
 #include <optional>
+#include <tuple>
+#include <utility>
 
 #include "app/session/files.h"
+#include "app/text.h"
 
 namespace ressort::commands {
 namespace {
@@ -88,14 +91,18 @@ class Track {
   Track(Reader& reader, std::vector<TrackEvent>& events, std::vector<std::uint8_t>& bytes)
       : reader_(reader), events_(events), bytes_(bytes) {}
 
-  void read() {
+  // Returns true after an end-of-track event.
+  bool read() {
     bool should_continue = true;
     while (should_continue && !reader_.is_at_end() && !reader_.failure()) {
       tick_ += reader_.quantity("the time before an event");
       should_continue = read_event();
     }
     add(TrackEvent::Kind::end, 0, 0);
+    return !should_continue && !reader_.failure();
   }
+  // Returns the offset of the first real-time byte between events, which belong into no file.
+  std::optional<std::size_t> realtime() const { return realtime_; }
 
  private:
   void add(TrackEvent::Kind kind, std::size_t first, std::size_t count) {
@@ -135,6 +142,8 @@ class Track {
       }
     } else if (status == 0xff) {
       return read_meta(start);
+    } else if (status >= 0xf8) {
+      realtime_ = realtime_.value_or(start);
     } else {
       reader_.fail(start, "this status byte is not allowed in a file");
     }
@@ -179,6 +188,7 @@ class Track {
   std::vector<std::uint8_t>& bytes_;
   std::uint64_t tick_ = 0;
   int running_ = 0;  // running status
+  std::optional<std::size_t> realtime_;
 };
 
 // Duration of a tick: a fraction of a quarter note, which depends on the tempo, or of an SMPTE
@@ -212,21 +222,96 @@ bool is_chunk(Bytes type, std::string_view name) {
   return std::equal(type.begin(), type.end(), name.begin(), name.end());
 }
 
+// Returns the offset of a chunk's name at or after `from`, or the end of the file.
+std::size_t find_chunk(Bytes file, std::string_view name, std::size_t from) {
+  const auto found = std::search(file.begin() + static_cast<std::ptrdiff_t>(from), file.end(),
+                                 name.begin(), name.end());
+  return static_cast<std::size_t>(found - file.begin());
+}
+
+// Reads the tracks of a file whose chunks may have wrong lengths and which may end early.
+class Tracks {
+ public:
+  Tracks(Bytes file, MidiFile& midi) : file_(file), midi_(midi) {}
+
+  // Reads a track whose events begin at `first`. Returns the offset behind it.
+  std::size_t read(std::size_t first, std::size_t count) {
+    const std::size_t rest = file_.size() - first;
+    std::size_t end = first + std::min(count, rest);
+    auto [at, is_ended] = read_events(first, end);
+    if (!is_ended && !is_chunk_at(end)) {  // events follow the chunk
+      const std::size_t next = find_chunk(file_, "MTrk", end);
+      undo();
+      std::tie(at, is_ended) = read_events(first, next);
+      end = next;
+      warn(first - 4, "the chunk says " + std::to_string(count) + " bytes, but its events go on");
+    } else if (count > rest || (is_ended && at < end && is_chunk_at(at))) {
+      warn(first - 4, "the chunk says " + std::to_string(count) +
+                          " bytes, but its events end after " + std::to_string(at - first));
+      end = at;
+    }
+    if (failure_) {
+      midi_.warnings.push_back(failure_->message + "; the rest of the track is left out");
+    } else if (realtime_) {
+      warn(*realtime_, "left out: real-time messages between the events");
+    }
+    return end;
+  }
+
+  void warn(std::size_t at, const std::string& text) {
+    midi_.warnings.push_back("byte " + std::to_string(at) + ": " + text);
+  }
+  std::vector<TrackEvent> take_events() { return std::move(events_); }
+
+ private:
+  std::pair<std::size_t, bool> read_events(std::size_t first, std::size_t end) {
+    kept_events_ = events_.size();
+    kept_bytes_ = midi_.bytes.size();
+    Reader reader(file_, first, end);
+    Track track(reader, events_, midi_.bytes);
+    const bool is_ended = track.read();
+    failure_ = reader.failure();
+    realtime_ = track.realtime();
+    return {reader.at(), is_ended};
+  }
+  // Drops the events of the track.
+  void undo() {
+    events_.resize(kept_events_);
+    midi_.bytes.resize(kept_bytes_);
+  }
+  bool is_chunk_at(std::size_t at) const {
+    const Bytes name = file_.subspan(at, std::min<std::size_t>(4, file_.size() - at));
+    return name.empty() || (name.size() == 4 && std::all_of(name.begin(), name.end(), [](int c) {
+                              return std::isalnum(c) != 0 || c == ' ';
+                            }));
+  }
+
+  Bytes file_;
+  MidiFile& midi_;
+  std::vector<TrackEvent> events_;
+  std::size_t kept_events_ = 0;  // of the tracks before
+  std::size_t kept_bytes_ = 0;
+  std::optional<Error> failure_;
+  std::optional<std::size_t> realtime_;
+};
+
 }  // namespace
 
 Result<MidiFile> parse_midi_file(Bytes file) {
-  Reader reader(file, 0, file.size());
-  if (!is_chunk(reader.take(4, "the header"), "MThd")) {
+  // A RIFF head (.rmi) or a MacBinary head may come first.
+  const std::size_t begin = find_chunk(file, "MThd", 0);
+  if (begin == file.size()) {
     return Error{"byte 0: expected MThd, the start of a MIDI file"};
   }
+  Reader reader(file, begin + 4, file.size());
   const std::uint32_t header_bytes = reader.number(4, "the header");
   const std::size_t header = reader.at();
   const std::uint32_t type = reader.number(2, "the header");
   const std::uint32_t tracks = reader.number(2, "the header");
-  if (!reader.failure() && (header_bytes < 6 || type > 1)) {
+  if (!reader.failure() && (header_bytes < 6 || type > 2)) {
     reader.fail(header, header_bytes < 6 ? "the header has fewer than 6 bytes"
                                          : "type " + std::to_string(type) +
-                                               " is not supported; only types 0 and 1 are");
+                                               " is unknown; types 0, 1 and 2 are read");
   }
   const Division division = read_division(reader);
   reader.take(header_bytes < 6 ? 0 : header_bytes - 6, "the header");
@@ -235,27 +320,36 @@ Result<MidiFile> parse_midi_file(Bytes file) {
   }
 
   MidiFile midi;
-  std::vector<TrackEvent> events;
-  for (std::uint32_t track = 0; track < tracks;) {
-    if (reader.is_at_end()) {
-      return Error{"byte " + std::to_string(reader.at()) + ": the file ends before track " +
-                   std::to_string(track + 1) + " of " + std::to_string(tracks)};
-    }
-    const Bytes name = reader.take(4, "the head of a chunk");
-    const std::uint32_t count = reader.number(4, "the head of a chunk");
-    const std::size_t first = reader.at();
-    reader.take(count, "a chunk");
-    if (reader.failure()) {
-      return *reader.failure();
-    }
-    if (is_chunk(name, "MTrk")) {
-      Reader inside(file, first, first + count);
-      Track(inside, events, midi.bytes).read();
-      if (inside.failure()) {
-        return *inside.failure();
-      }
-      ++track;
-    }
+  Tracks reading(file, midi);
+  std::uint32_t found = 0;
+  std::size_t at = reader.at();
+  constexpr std::size_t head_bytes = 8;
+  while (at + head_bytes <= file.size() &&
+         (found < tracks || is_chunk(file.subspan(at, 4), "MTrk"))) {
+    Reader head(file, at, file.size());
+    const bool is_track = is_chunk(head.take(4, "the head of a chunk"), "MTrk");
+    const std::size_t count = head.number(4, "the head of a chunk");
+    found += is_track ? 1 : 0;
+    const bool is_played = is_track && (type < 2 || found == 1);
+    at = is_played ? reading.read(head.at(), count)
+                   : head.at() + std::min(count, file.size() - head.at());
+  }
+  if (found == 0) {
+    return Error{"byte " + std::to_string(at) + ": the file ends before track 1 of " +
+                 std::to_string(tracks)};
+  }
+  if (type == 2) {
+    reading.warn(header, "type 2, a list of sequences: only the first one is played");
+  } else if (found != tracks) {
+    reading.warn(header + 2, "the header says " + counted(tracks, "track", "tracks") +
+                                 ", the file has " + std::to_string(found));
+  }
+  std::vector<TrackEvent> events = reading.take_events();
+  const bool is_empty = std::all_of(events.begin(), events.end(), [](const TrackEvent& event) {
+    return event.kind == TrackEvent::Kind::end;
+  });
+  if (is_empty && !midi.warnings.empty()) {
+    return Error{midi.warnings.front()};
   }
 
   std::stable_sort(events.begin(), events.end(),
@@ -356,6 +450,9 @@ Result<MidiFile> read_midi_file(const std::string& path) {
   if (!midi) {
     return Error{"'" + path + "' is not a valid MIDI file: " + midi.error().message};
   }
+  for (std::string& warning : midi->warnings) {
+    warning = path + ": " + warning;
+  }
   return midi;
 }
 
@@ -363,7 +460,7 @@ bool is_midi_file_name(std::string_view path) {
   std::string lower(path);
   std::transform(lower.begin(), lower.end(), lower.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return lower.ends_with(".mid") || lower.ends_with(".midi");
+  return lower.ends_with(".mid") || lower.ends_with(".midi") || lower.ends_with(".rmi");
 }
 
 }  // namespace ressort::commands

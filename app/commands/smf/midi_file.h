@@ -1,4 +1,4 @@
-// app/commands: Standard MIDI Files (MIDI Manufacturers Association, RP-001), types 0 and 1. Pure.
+// app/commands: Standard MIDI Files (MIDI Manufacturers Association, RP-001). Pure.
 #pragma once
 
 #include <cstddef>
@@ -21,9 +21,10 @@ struct MidiFile {
     std::uint32_t first = 0;  // index into `bytes`
     std::uint32_t count = 0;
   };
-  std::vector<Message> messages;    // messages of all tracks, sorted by time, then by track
-  std::vector<std::uint8_t> bytes;  // bytes of the messages, each with its status byte
-  double length_s = 0.0;            // time of the last event, ends of tracks included
+  std::vector<Message> messages;      // messages of all tracks, sorted by time, then by track
+  std::vector<std::uint8_t> bytes;    // bytes of the messages, each with its status byte
+  double length_s = 0.0;              // time of the last event, ends of tracks included
+  std::vector<std::string> warnings;  // damage that was read over
 
   std::span<const std::uint8_t> bytes_of(const Message& message) const {
     return std::span(bytes).subspan(message.first, message.count);
@@ -32,9 +33,11 @@ struct MidiFile {
 
 // Parses channel messages and SysEx and converts ticks to seconds. Ignores other meta events, other
 // chunks, and bytes after the last track. Running status continues after meta events, as most
-// programs write it. Releases at the end the keys and pedals that the file leaves down. Errors have
-// the offset of the wrong byte, from 0. Fails for files of type 2 and for files longer than a day.
-// O(n log n) in the size of the file.
+// programs write it. Releases at the end the keys and pedals that the file leaves down. Reads files
+// in a RIFF or MacBinary wrapper, and over damage: wrong lengths and counts, real-time messages, an
+// early end, for which it adds warnings. Plays the first sequence of type 2. Errors and warnings
+// have the offset of the byte, from 0. Fails for files longer than a day. O(n log n) in the size of
+// the file, for each of its tracks at worst.
 Result<MidiFile> parse_midi_file(std::span<const std::uint8_t> file);
 
 // Appends messages at the end that release all keys and pedals that are still down.
@@ -43,7 +46,7 @@ void release_all(MidiFile& midi);
 // Reads and parses a file. Errors have its name.
 Result<MidiFile> read_midi_file(const std::string& path);
 
-// Returns whether a name ends in .mid or .midi, in upper or lower case.
+// Returns whether a name ends in .mid, .midi or .rmi, in upper or lower case.
 bool is_midi_file_name(std::string_view path);
 
 }  // namespace ressort::commands

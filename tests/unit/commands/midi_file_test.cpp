@@ -140,14 +140,14 @@ TEST_CASE("Errors of a MIDI file have the offset of the byte", "[midi_file]") {
   CHECK(contains(failure({}), "MThd"));
   CHECK(contains(failure({'R', 'I', 'F', 'F', 0, 0, 0, 0}), "byte 0"));
   CHECK(contains(failure({'M', 'T', 'h', 'd', 0, 0}), "byte 6: the file ends"));
-  CHECK(contains(failure(header(2, 1, 96)), "type 2"));
+  CHECK(contains(failure(header(3, 1, 96)), "type 3"));
   CHECK(contains(failure(header(0, 1, 0)), "byte 12"));
   CHECK(contains(failure(header(0, 1, 0xe000)), "SMPTE"));
   CHECK(contains(failure(header(0, 1, (256 - 25) << 8)), "SMPTE"));
   CHECK(contains(failure(header(0, 1, 96)), "byte 14: the file ends before track 1 of 1"));
   const Bytes head = header(0, 1, 96);  // 14 bytes, the track's events begin at 22
-  CHECK(contains(failure(head + Bytes{'M', 'T', 'r', 'k', 0, 0, 0, 9, 0}),
-                 "the file ends within a chunk"));
+  CHECK(
+      contains(failure(head + Bytes{'M', 'T', 'r', 'k', 0, 0, 0, 9, 0}), "the chunk says 9 bytes"));
   CHECK(contains(failure(head + track({0, 60, 1})), "byte 23: expected an event"));
   CHECK(contains(failure(head + track({0, 0x90, 60, 0x90})), "byte 25: expected a data byte"));
   CHECK(contains(failure(head + track({0, 0x90, 60})),
@@ -163,6 +163,66 @@ TEST_CASE("Errors of a MIDI file have the offset of the byte", "[midi_file]") {
                  "longer than a day"));
 }
 
+// Each kind of damage, in each wrapper, with one and with two tracks: the notes are played and the
+// damage is told once.
+TEST_CASE("Wrapped and damaged files play what they have", "[midi_file]") {
+  const Bytes note = {96, 0x90, 60, 100, 96, 0x80, 60, 64};
+  const auto chunk = [](int says, const Bytes& events) {
+    return Bytes{'M', 'T', 'r', 'k', 0, 0, 0, static_cast<std::uint8_t>(says)} + events;
+  };
+  const Bytes whole = note + end;
+  const auto size = static_cast<int>(whole.size());
+  const Bytes realtime = Bytes{96, 0x90, 60, 100, 48, 0xf8, 48, 0x80, 60, 64} + end;
+  const struct {
+    const char* what;
+    Bytes last;  // the last track
+    const char* warning;
+  } kinds[] = {
+      {"intact", chunk(size, whole), ""},
+      {"long", chunk(size + 90, whole), "the chunk says 102 bytes, but its events end"},
+      {"short", chunk(size - 3, whole), "the chunk says 9 bytes, but its events go on"},
+      {"empty", chunk(0, whole), "the chunk says 0 bytes, but its events go on"},
+      {"cut", chunk(size, Bytes(whole.begin(), whole.end() - 1)), "events end after 11"},
+      {"realtime", track(realtime), "left out: real-time messages"},
+      {"torn", chunk(size, Bytes(note.begin(), note.end() - 1)),
+       "within a channel message; the rest of the track is left out"},
+      {"wrong", track(Bytes{96, 0x90, 60, 100, 96, 0xf4, 1}),
+       "this status byte is not allowed in a file; the rest of the track is left out"},
+  };
+  int files = 0;
+  for (const auto& kind : kinds) {
+    for (const int count : {1, 2}) {
+      for (const int told : {count, 5}) {
+        Bytes file = header(count == 1 ? 0 : 1, told, 96);
+        file = file + (count == 2 ? track(Bytes{0, 0x91, 70, 1, 1, 0x81, 70, 2} + end) : Bytes()) +
+               kind.last;
+        Bytes riff = {'R', 'I', 'F', 'F', 0, 0, 0, 0, 'R', 'M', 'I', 'D', 'd', 'a', 't', 'a'};
+        riff = riff + Bytes{static_cast<std::uint8_t>(file.size()), 0, 0, 0};
+        for (const Bytes& wrapper : {Bytes(), riff, Bytes(128, 0)}) {
+          const MidiFile midi = read(wrapper + file);
+          INFO(kind.what << ", " << count << " of " << told << " tracks, behind "
+                         << wrapper.size());
+          const std::size_t first = count == 2 ? 2 : 0;
+          check(midi, first, 0.5, {0x90, 60, 100});
+          REQUIRE(midi.messages.size() == first + 2);
+          CHECK(midi.messages.back().time_s == 1.0);  // a key left down is released at the end
+          const bool has_warning = kind.warning[0] != 0;
+          REQUIRE(midi.warnings.size() == (has_warning ? 1U : 0U) + (told == count ? 0U : 1U));
+          CHECK((!has_warning || contains(midi.warnings[0], kind.warning)));
+          CHECK((told == count || contains(midi.warnings.back(), "the header says 5 tracks")));
+          ++files;
+        }
+      }
+    }
+  }
+  CHECK(files == 96);
+  const Bytes first = track(note + end);
+  const MidiFile list = read(header(2, 2, 96) + first + track(Bytes{0, 0x92, 1, 1} + end));
+  CHECK(list.messages.size() == 2);
+  CHECK(list.warnings == std::vector<std::string>{
+                             "byte 8: type 2, a list of sequences: only the first one is played"});
+}
+
 TEST_CASE("A track may end without an end-of-track event", "[midi_file]") {
   CHECK(read(header(0, 1, 96) + track({0, 0xc0, 5})).messages.size() == 1);
   CHECK(read(header(0, 1, 96) + track({})).messages.empty());
@@ -171,6 +231,7 @@ TEST_CASE("A track may end without an end-of-track event", "[midi_file]") {
 TEST_CASE("The extension of a MIDI file may be in any case", "[midi_file]") {
   CHECK(is_midi_file_name("a/song.mid"));
   CHECK(is_midi_file_name("SONG.MIDI"));
+  CHECK(is_midi_file_name("song.rmi"));
   CHECK_FALSE(is_midi_file_name("song.mdl"));
   CHECK_FALSE(is_midi_file_name("mid"));
 }

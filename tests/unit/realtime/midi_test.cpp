@@ -119,8 +119,11 @@ double tuned_hz(int semitone, int fraction) {
   return 440.0 * std::pow(2.0, (semitone - 69.0 + fraction / 16384.0) / 12.0);
 }
 
-Bytes dump_of_all_keys() {
+Bytes dump_of_all_keys(bool has_bank = false) {
   Bytes bytes = {0x7e, 0x7f, 0x08, 0x01, 0};
+  if (has_bank) {
+    bytes = {0x7e, 0x7f, 0x08, 0x04, 2, 0};
+  }
   bytes.insert(bytes.end(), 16, 'x');
   for (int key = 0; key < 128; ++key) {
     const bool stays = key == 61;
@@ -161,22 +164,33 @@ TEST_CASE("tuning messages are read, in one packet or several", "[midi]") {
     CHECK(reader.malformed() == 0);
   }
   MidiReader reader;
-  const auto dump = read(reader, dump_of_all_keys());
-  REQUIRE(dump.size() == 127);
-  check_event(dump[60], EventKind::key_tuning, 0, 60, tuned_hz(60, 64 * 128 + 3));
-  check_event(dump[61], EventKind::key_tuning, 0, 62, tuned_hz(62, 64 * 128 + 3));
-  CHECK(dump[60].value2 == 0.0);
+  for (const bool has_bank : {false, true}) {
+    const auto dump = read(reader, dump_of_all_keys(has_bank));
+    REQUIRE(dump.size() == 127);
+    check_event(dump[60], EventKind::key_tuning, 0, 60, tuned_hz(60, 64 * 128 + 3));
+    check_event(dump[61], EventKind::key_tuning, 0, 62, tuned_hz(62, 64 * 128 + 3));
+    CHECK(dump[60].value2 == 0.0);
+  }
+  for (const std::uint8_t kind : {0x7e, 0x7f}) {  // for new notes only, or for sounding notes too
+    const auto one = read(reader, {0xf0, kind, 0, 8, 7, 1, 2, 1, 60, 61, 64, 0, 0xf7});
+    REQUIRE(one.size() == 1);
+    check_event(one[0], EventKind::key_tuning, 0, 60, tuned_hz(61, 8192));
+    CHECK(one[0].value2 == (kind == 0x7f ? 1.0 : 0.0));
+  }
   CHECK(reader.malformed() == 0);
 }
 
 TEST_CASE("a truncated, overlong or damaged tuning message is rejected", "[midi]") {
   Bytes altered = dump_of_all_keys();
   altered[100] ^= 1;
+  Bytes altered_bank = dump_of_all_keys(true);
+  altered_bank[100] ^= 1;
   Bytes shorter = dump_of_all_keys();
   shorter.erase(shorter.begin() + 50);
   Bytes longer = dump_of_all_keys();
   longer.insert(longer.end() - 1, 5000, 1);
   const std::vector<Bytes> wrong = {altered,
+                                    altered_bank,
                                     shorter,
                                     longer,
                                     {0xf0, 0x7f, 0, 8, 2, 0, 2, 60, 60, 0, 0, 0xf7},
