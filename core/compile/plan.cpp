@@ -106,8 +106,9 @@ class Chooser {
     }
     may_gain_ = eigenvectors_of_ > most_modes_ && eigenvectors_of_ <= patient_modes;
     const std::uint32_t times = steps_to_reach();
+    const bool is_accurate = meter_ == nullptr || sum_of(meter_->of(Form()), spent_).meets(budget_);
     if (program_.modes.empty() && times <= most_steps_to_reach && !may_gain_) {
-      add_steps(times, load_at_steps());
+      add_steps(times, load_at_steps(), {}, times > 1 && is_accurate);
     }
     if (candidates_.empty() && has_free_modes(program_)) {
       consider_identical();
@@ -195,8 +196,9 @@ class Chooser {
   }
 
   // Adds `times` steps a sample in every published form that may be the cheapest. All of them have
-  // the same accuracy.
-  void add_steps(std::uint32_t times, const Workload& load, std::optional<Accuracy> accuracy = {}) {
+  // the same accuracy. `by_key`: for high keys only.
+  void add_steps(std::uint32_t times, const Workload& load, std::optional<Accuracy> accuracy = {},
+                 bool by_key = false) {
     Program fine = oversampled_program(program_, times);
     Chooser chooser(fine, load, 0, {}, progress_);
     chooser.consider_identical();
@@ -205,7 +207,7 @@ class Chooser {
         is_open() ? chooser.leading() : std::vector<std::size_t>{chooser.best_};
     for (const std::size_t i : all) {
       fine.form = chooser.candidates_[i].form;
-      add(Method::oversampled, oversampled_form(fine, times), accuracy);
+      add(Method::oversampled, oversampled_form(fine, times, by_key), accuracy);
       accuracy = candidates_.back().of_form;
     }
   }

@@ -460,6 +460,9 @@ struct Engine::Player {
     }
   }
 
+  // The pitch of a lane without a voice, which should take the fewest steps.
+  static constexpr VoicePitch resting{.omega = 1e-6, .share = 0.0, .is_new = true};
+
   // Updates glides, energy and sleep. Called once in max_block_frames, counted from the engine's
   // start, so that the result does not depend on the block size.
   template <class T>
@@ -484,6 +487,9 @@ struct Engine::Player {
       }
       if (was_awake && !voice.awake) {
         watch.reset(lane);
+        for (PartBank<T>& part : b.parts) {
+          part.of(lane).tune(lane % part.width, resting);
+        }
       }
     }
     watch.update_reading(voices);

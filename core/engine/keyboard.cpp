@@ -495,16 +495,19 @@ void Keyboard::set_tuning_parameter(double value) {
 }
 
 double Keyboard::factor_of(const Voice& voice, double highest_factor) const {
-  return voice.is_new || voice.is_retuned ? tuning_.factor_for(voice, channels_, highest_factor)
-                                          : voice.factor;
+  return voice.is_new || voice.is_retuned
+             ? tuning_.factor_for(voice, VoiceTuning::bend_of(voice, channels_), highest_factor)
+             : voice.factor;
 }
 
 void Keyboard::update_factors(bool all, double highest_factor) {
   for (Voice& voice : voices) {
     if (voice.awake && (all || voice.is_new || voice.is_retuned)) {
-      const double factor = tuning_.factor_for(voice, channels_, highest_factor);
+      const double bent = VoiceTuning::bend_of(voice, channels_);
+      const double factor = tuning_.factor_for(voice, bent, highest_factor);
       voice.is_retuned |= factor != voice.factor;
       voice.factor = factor;
+      voice.sounding_hz = voice.frequency_hz * bent;
     }
   }
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace ressort::engine {
 namespace {
@@ -110,6 +111,7 @@ void Parameters::update_voice_values(const Voices& voices) {
 template <class T>
 void Parameters::apply(Bank<T>& bank, const Voices& voices, EnergyWatch& watch) {
   update_voice_values(voices);
+  const double highest = highest_factor();
   bank.each_group([&](PartBank<T>& part, const VoiceGroup& group) {
     const auto& depending = part.program.depending;
     const bool has_turned = std::any_of(turned_.begin(), turned_.end(), [&](std::uint16_t index) {
@@ -123,6 +125,10 @@ void Parameters::apply(Bank<T>& bank, const Voices& voices, EnergyWatch& watch) 
       if (!voice.awake || !(has_turned || is_tuned)) {
         continue;
       }
+      kernel.tune(lane - group.first,
+                  {.omega = 2.0 * std::numbers::pi * voice.sounding_hz / part.program.rate_hz,
+                   .share = voice.factor / highest,
+                   .is_new = voice.is_new});
       if (voice.is_new) {
         watch.reset(lane, group.part);
         kernel.reset(lane - group.first);

@@ -60,11 +60,14 @@ class VoiceTuning {
   double playable_hz(int key, double hz, double highest_factor) const {
     return hz < 0.5 * rate_hz_ && factor_at(key, hz) <= highest_factor ? hz : 0.0;
   }
-  // Returns the voice's factor on every stiffness, with bend and glide.
-  double factor_for(const Voice& voice, const Channels& channels, double highest_factor) const {
-    const double bent = std::exp2(
+  // Returns the ratio by which bend, glide and vibrato change a voice's frequency.
+  static double bend_of(const Voice& voice, const Channels& channels) {
+    return std::exp2(
         (voice.semitones + channels.zone_semitones(voice.channel) + voice.glide + voice.vibrato) /
         12.0);
+  }
+  // Returns the voice's factor on every stiffness, with `bent` as bend_of().
+  double factor_for(const Voice& voice, double bent, double highest_factor) const {
     const double factor = voice.frequency_hz > 0.0
                               ? factor_at(key_of(voice), voice.frequency_hz * bent)
                               : bent * bent;

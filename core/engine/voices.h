@@ -87,6 +87,7 @@ struct alignas(64) Voice {
   double lowpassed_beside = 0.0;  // that of the earlier voice
   double agreement = 0.0;         // sum of products of both
   double frequency_hz = 0.0;      // without bend; 0: as the model is written
+  double sounding_hz = 0.0;       // with bend, glide and vibrato
   double key_hz = 0.0;            // requested frequency, before the stability limit
   double semitones = 0.0;         // its own channel's bend and tuning
   double vibrato = 0.0;           // semitones by LFOs

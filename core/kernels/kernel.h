@@ -111,6 +111,13 @@ std::size_t copy_positions(std::span<const std::uint32_t> nodes, std::span<doubl
   return nodes.size();
 }
 
+// The pitch of a voice, by which a kernel may choose its steps.
+struct VoicePitch {
+  double omega = 0.0;   // of its lowest mode, rad per sample; 0: not known
+  double share = 1.0;   // of the highest stiffness factor at which the Program is stable
+  bool is_new = false;  // reset() follows
+};
+
 // Steps a Program. Kernels share the Program, which outlives them. No function throws or allocates
 // after construction.
 template <class T>
@@ -132,6 +139,8 @@ class Kernel {
   // Disables passive links in the sample after set_state(), too: that sample only reproduces the
   // state of another kernel. [audio]
   virtual void disable_links(std::size_t) {}
+  // Tells the pitch of a voice before its coefficients are set. [audio]
+  virtual void tune(std::size_t, const VoicePitch&) {}
   // Sets one lane to the initial state of the model.
   void reset(std::size_t lane) { set_state(lane, start_.position.data(), start_.velocity.data()); }
   // Copies the position and velocity of every node after the last sample. Returns false if the

@@ -257,7 +257,8 @@ std::string form_name(const Form& form) {
     name += " exact";
   }
   if (const auto* const steps = form.get_if<Oversampled>()) {
-    name += " " + std::to_string(steps->times) + " " + form_name(steps->fine->form);
+    name += (steps->coarse ? " 1 or " : " ") + std::to_string(steps->times) + " " +
+            form_name(steps->fine->form);
   }
   return name;
 }

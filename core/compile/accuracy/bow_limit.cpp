@@ -81,7 +81,7 @@ double bow_steps_per_sample(const Machine& machine) {
         std::any_of(program.link_runs.begin(), program.link_runs.end(),
                     [](const LinkRun& run) { return is_bow(run.law, run.scheme); });
     const auto* fine = program.form.get_if<Oversampled>();
-    const double steps = fine != nullptr ? fine->times : 1.0;
+    const double steps = fine != nullptr && !fine->coarse ? fine->times : 1.0;
     fewest = has_bow ? std::min(fewest, steps) : fewest;
   }
   return std::isfinite(fewest) ? fewest : 1.0;

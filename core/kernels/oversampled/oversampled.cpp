@@ -1,6 +1,7 @@
 #include "core/kernels/oversampled/oversampled.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/kernels/oversampled/oversampled_form.h"
 
@@ -11,23 +12,29 @@ static_assert(most_oversampling <= max_block_frames);
 template <class T>
 OversampledKernel<T>::OversampledKernel(const Program& program, const Oversampled& form,
                                         std::size_t voices, Isa isa)
-    : OversampledKernel(program, form, make_kernel<T>(*form.fine, voices, isa)) {}
+    : OversampledKernel(program, form, make_kernel<T>(*form.fine, voices, isa),
+                        form.coarse ? make_kernel<T>(*form.coarse, voices, isa) : nullptr) {}
 
 template <class T>
 OversampledKernel<T>::OversampledKernel(const Program& program, const Oversampled& form,
-                                        std::unique_ptr<Kernel<T>> fine)
+                                        std::unique_ptr<Kernel<T>> fine,
+                                        std::unique_ptr<Kernel<T>> coarse)
     : Kernel<T>(program, fine->width()),
       program_(program),
       times_(form.times),
       fine_(std::move(fine)),
+      coarse_(std::move(coarse)),
+      warp_(this->width()),
       value_(times_ * program.inputs.size() * this->width()),
       velocity_(value_.size()),
       audio_(times_ * program.audio_coefficients.size() * this->width()),
       outputs_(times_ * program.outputs.size() * this->width()),
+      position_(program.position.size()),
       speed_(program.position.size()) {
   for (const Coefficient& coefficient : program.coefficients) {
     factor_.push_back(
         static_cast<T>(rate_factor(coefficient.unit, 1.0 / static_cast<double>(times_))));
+    is_stiffness_.push_back(coefficient.unit == Unit::stiffness);
   }
   for (std::size_t lane = 0; lane < this->width(); ++lane) {
     this->reset(lane);
@@ -35,20 +42,43 @@ OversampledKernel<T>::OversampledKernel(const Program& program, const Oversample
 }
 
 template <class T>
+void OversampledKernel<T>::tune(std::size_t lane, const VoicePitch& pitch) {
+  if (!coarse_ || !(pitch.is_new || is_coarse(lane))) {
+    return;
+  }
+  const auto times = static_cast<double>(times_);
+  if (pitch.omega > 0.0 && pitch.share * times * times <= 1.0) {
+    const double ratio =
+        std::sin(0.5 * pitch.omega) / (times * std::sin(0.5 * pitch.omega / times));
+    warp_[lane] = static_cast<T>(ratio * ratio);
+    return;
+  }
+  const bool is_moved =
+      is_coarse(lane) && !pitch.is_new && coarse_->save(lane, position_.data(), speed_.data());
+  warp_[lane] = T(0);
+  if (is_moved) {
+    for (double& speed : speed_) {
+      speed /= times;
+    }
+    fine_->set_state(lane, position_.data(), speed_.data());
+  }
+}
+
+template <class T>
 void OversampledKernel<T>::set_state(std::size_t lane, const double* x, const double* v) {
   for (std::size_t node = 0; node < speed_.size(); ++node) {
-    speed_[node] = v[node] / static_cast<double>(times_);
+    speed_[node] = v[node] / steps_of(lane);
   }
-  fine_->set_state(lane, x, speed_.data());
+  of(lane).set_state(lane, x, speed_.data());
 }
 
 template <class T>
 bool OversampledKernel<T>::save(std::size_t lane, double* x, double* v) const {
-  if (!fine_->save(lane, x, v)) {
+  if (!of(lane).save(lane, x, v)) {
     return false;
   }
   for (std::size_t node = 0; node < speed_.size(); ++node) {
-    v[node] *= static_cast<double>(times_);
+    v[node] *= steps_of(lane);
   }
   return true;
 }
@@ -58,8 +88,8 @@ void OversampledKernel<T>::strike(std::size_t lane, std::span<const std::uint32_
                                   std::span<const double> changes) {
   refine_coefficients();  // A voice may be struck before its first step.
   for (std::size_t i = 0; i < nodes.size(); ++i) {
-    const double change = changes[i] / static_cast<double>(times_);
-    fine_->strike(lane, nodes.subspan(i, 1), {&change, 1});
+    const double change = changes[i] / steps_of(lane);
+    of(lane).strike(lane, nodes.subspan(i, 1), {&change, 1});
   }
 }
 
@@ -67,7 +97,7 @@ template <class T>
 std::size_t OversampledKernel<T>::read_positions(std::size_t lane,
                                                  std::span<const std::uint32_t> nodes,
                                                  std::span<double> numbers) const {
-  return fine_->read_positions(lane, nodes, numbers);
+  return of(lane).read_positions(lane, nodes, numbers);
 }
 
 template <class T>
@@ -75,8 +105,12 @@ void OversampledKernel<T>::refine_coefficients() {
   const std::size_t width = this->width();
   for (std::size_t c = 0; c < factor_.size(); ++c) {
     for (std::size_t lane = 0; lane < width; ++lane) {
-      fine_->coefficients.value[c * width + lane] =
-          this->coefficients.value[c * width + lane] * factor_[c];
+      const T value = this->coefficients.value[c * width + lane];
+      fine_->coefficients.value[c * width + lane] = value * factor_[c];
+      if (coarse_) {
+        coarse_->coefficients.value[c * width + lane] =
+            is_stiffness_[c] && is_coarse(lane) ? value * warp_[lane] : value;
+      }
     }
   }
 }
@@ -114,23 +148,43 @@ void OversampledKernel<T>::play(const Block<T>& block) {
   const std::size_t inputs = program_.inputs.size() * width;
   const std::size_t outputs = program_.outputs.size() * width;
   const std::size_t turned = program_.audio_coefficients.size() * width;
+  const auto end = warp_.begin() + static_cast<std::ptrdiff_t>(std::min(width, block.lanes));
+  const bool has_fine = std::find(warp_.begin(), end, T(0)) != end;
+  const bool has_coarse = std::find_if(warp_.begin(), end, [](T w) { return w > T(0); }) != end;
   refine_coefficients();
-  for (std::size_t frame = 0; frame < block.frames; ++frame) {
-    if (ramps.frames > 0) {
+  for (std::size_t frame = 0; frame < block.frames;) {
+    const bool moves = ramps.frames > 0;
+    if (moves) {
       advance(ramps);
       refine_coefficients();
     }
-    step_finely(block.value + frame * inputs, block.velocity + frame * inputs,
-                block.audio + frame * turned);
-    std::copy_n(outputs_.end() - static_cast<std::ptrdiff_t>(outputs), outputs,
-                block.outputs + frame * outputs);
+    const std::size_t next = moves ? frame + 1 : block.frames;
+    if (has_coarse) {
+      coarse_->step({.frames = next - frame,
+                     .value = block.value + frame * inputs,
+                     .velocity = block.velocity + frame * inputs,
+                     .is_still = block.is_still,
+                     .audio = block.audio + frame * turned,
+                     .outputs = block.outputs + frame * outputs,
+                     .lanes = block.lanes});
+    }
+    for (; has_fine && frame < next; ++frame) {
+      step_finely(block.value + frame * inputs, block.velocity + frame * inputs,
+                  block.audio + frame * turned);
+      const T* const last = outputs_.data() + outputs_.size() - outputs;
+      for (std::size_t i = 0; i < outputs; ++i) {
+        block.outputs[frame * outputs + i] =
+            is_coarse(i % width) ? block.outputs[frame * outputs + i] : last[i];
+      }
+    }
+    frame = next;
   }
   this->coefficients.finish(block.frames);
 }
 
 template <class T>
 bool OversampledKernel<T>::is_near_start(std::size_t lane, double bound) const {
-  return fine_->is_near_start(lane, bound);
+  return of(lane).is_near_start(lane, bound);
 }
 
 template class OversampledKernel<float>;

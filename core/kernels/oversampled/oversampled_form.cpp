@@ -7,19 +7,32 @@
 
 namespace ressort::kernels {
 
-Program oversampled_program(const Program& program, std::uint32_t times) {
-  Program fine = program;
-  fine.form = Form();
-  fine.rate_hz *= times;
-  fine.rate_ratio /= times;
-  for (double& velocity : fine.velocity) {
+namespace {
+
+Program at_rate(Program program, double times) {
+  program.rate_hz *= times;
+  program.rate_ratio /= times;
+  for (double& velocity : program.velocity) {
     velocity /= times;
   }
+  return program;
+}
+
+}  // namespace
+
+Program oversampled_program(const Program& program, std::uint32_t times) {
+  Program fine = at_rate(program, times);
+  fine.form = Form();
   return fine;
 }
 
-Oversampled oversampled_form(Program fine, std::uint32_t times) {
-  return {.fine = std::make_shared<const Program>(std::move(fine)), .times = times};
+Oversampled oversampled_form(Program fine, std::uint32_t times, bool by_key) {
+  Oversampled form{.times = times};
+  if (by_key) {
+    form.coarse = std::make_shared<const Program>(at_rate(fine, 1.0 / times));
+  }
+  form.fine = std::make_shared<const Program>(std::move(fine));
+  return form;
 }
 
 double operations(const Program& program, const Oversampled& form, const Workload& load) {
@@ -28,13 +41,14 @@ double operations(const Program& program, const Oversampled& form, const Workloa
 }
 
 std::string description(const Program&, const Oversampled& form) {
-  return std::to_string(form.times) + " steps a sample: " + description(*form.fine);
+  return std::string(form.coarse ? "low keys 1, high keys " : "") + std::to_string(form.times) +
+         " steps a sample: " + description(*form.fine);
 }
 
 std::uint64_t voice_bytes(const Program& program, const Oversampled& form,
                           std::uint64_t number_bytes) {
   constexpr std::uint64_t numbers_of_coefficient = 3;  // beside those of the finer Program's kernel
-  return voice_bytes(*form.fine, number_bytes) +
+  return (form.coarse ? 2 : 1) * voice_bytes(*form.fine, number_bytes) +
          number_bytes * numbers_of_coefficient * program.coefficients.size();
 }
 

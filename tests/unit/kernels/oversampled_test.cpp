@@ -1,5 +1,9 @@
 // Oversampling: several steps per sample equal the network at a multiple of the rate, decimated.
+#include <complex>
+#include <numbers>
+
 #include "core/kernels/oversampled/oversampled_form.h"
+#include "core/model/language/expression.h"
 #include "tests/support/harness.h"
 
 namespace ressort::oversampled_test {
@@ -87,6 +91,76 @@ TEST_CASE("ramps and states are passed on to the finer steps", "[oversampled]") 
     const double wanted = coefficient_value(program, program.coefficients[c], turned, 1.0);
     CHECK(one.kernel().coefficients.value[c * one.lanes()] == Approx(wanted).epsilon(1e-12));
   }
+}
+
+// An oscillator, plucked off its rest.
+Program oscillator(double stiffness, bool by_key) {
+  Program program = make_program(
+      network_of("@m osc 1. " + print_number(stiffness) + " 0. 1. 0.\n@out1 posOutput @m\n"),
+      44100.0, true);
+  program.form = oversampled_form(oversampled_program(program, times), times, by_key);
+  return program;
+}
+
+// The frequency of an oscillator of mass 1 that takes `times` steps of symplectic Euler a sample.
+double omega_of(double stiffness) {
+  return 2.0 * times * std::asin(std::sqrt(stiffness) / (2.0 * times));
+}
+
+TEST_CASE("a low voice takes one step a sample at the pitch of several", "[oversampled]") {
+  constexpr double stiffness = 0.05;  // 1,570 Hz: one step would be 3.4 cents sharp
+  const double omega = omega_of(stiffness);
+  Bare<double> bare(oscillator(stiffness, true), 2);
+  bare.kernel().tune(0, {.omega = omega, .share = 1.0 / (times * times), .is_new = true});
+  bare.kernel().reset(0);
+  std::vector<std::vector<double>> heard(2);
+  for (int n = 0; n < 20000; ++n) {
+    bare.step({});
+    heard[0].push_back(bare.outputs(0)[0]);
+    heard[1].push_back(bare.outputs(1)[0]);
+  }
+  for (const std::vector<double>& y : heard) {
+    // The phase relative to a tone of omega, from a Hann window of 1,000 samples.
+    const auto phase_at = [&](std::size_t first) {
+      std::complex<double> sum;
+      for (std::size_t n = 0; n < 1000; ++n) {
+        const double window =
+            1.0 - std::cos(2.0 * std::numbers::pi * static_cast<double>(n) / 1000.0);
+        sum += window * y[first + n] * std::polar(1.0, -omega * static_cast<double>(first + n));
+      }
+      return std::arg(sum);
+    };
+    // 0.001 cents over 18,000 samples are 0.0023 rad.
+    CHECK(std::fabs(phase_at(19000) - phase_at(1000)) < 0.0023);
+  }
+  // The voice of one step moves further per step than that of four, so the two differ.
+  CHECK(heard[0] != heard[1]);
+}
+
+TEST_CASE("a voice that is bent beyond the limit of one step takes several", "[oversampled]") {
+  // The stiffness 5 is unstable at one step a sample, and stable at four. The bend keeps the
+  // position and the velocity, so the amplitude stays within 1 / sqrt(K) of velocity and position.
+  constexpr double stiffness = 0.05;
+  const Program program = oscillator(stiffness, true);
+  Bare<double> bare(program);
+  bare.kernel().tune(0, {.omega = omega_of(stiffness), .share = 0.01, .is_new = true});
+  bare.kernel().reset(0);
+  double before = 0.0;
+  for (int n = 0; n < 1000; ++n) {
+    before = bare.step({})[0];
+  }
+  bare.kernel().tune(0, {.omega = omega_of(100.0 * stiffness), .share = 1.0});
+  double x = 0.0;
+  double v = 0.0;
+  REQUIRE(bare.kernel().save(0, &x, &v));
+  CHECK(x == before);
+  bare.set_coefficients(0, program.parameters, 100.0, false);
+  double peak = 0.0;
+  for (int n = 0; n < 20000; ++n) {
+    peak = std::max(peak, std::fabs(bare.step({})[0]));
+  }
+  CHECK(peak > 0.9 * std::fabs(x));
+  CHECK(peak < 1.3 * std::hypot(x, v / std::sqrt(100.0 * stiffness)));
 }
 
 }  // namespace
