@@ -1,97 +1,105 @@
 #include "core/identification/damped.h"
 
 #include <algorithm>
-#include <array>
+
+#include "core/linear_algebra/complex.h"
+#include "core/linear_algebra/eigen.h"
 
 namespace ressort::identification {
 namespace {
 
+// Samples are processed as a matrix with a block in each column, and all modes at once.
 constexpr std::size_t block_frames = 256;
+constexpr std::size_t blocks_at_once = 32;
 constexpr double gone = 34.0;  // Decay in nepers (295 dB) after which a mode is treated as silent.
 
-// Powers z^n for n below the block length, computed by doubling.
-struct PowerTable {
-  explicit PowerTable(Complex log_z) {
-    re[0] = 1.0;
-    im[0] = 0.0;
-    for (std::size_t known = 1; known < block_frames; known *= 2) {
-      const Complex step = std::exp(log_z * static_cast<double>(known));
-      for (std::size_t n = 0; n < known; ++n) {
-        const Complex power = times(step, {re[n], im[n]});
-        re[known + n] = power.real();
-        im[known + n] = power.imag();
+// The modes that ring in a stretch of samples.
+struct Stretch {
+  Stretch(std::span<const Complex> log_z, std::size_t first, std::size_t frames)
+      : from(first), samples(block_frames, blocks_at_once) {
+    size = std::min(frames - first, block_frames * blocks_at_once);
+    for (std::size_t k = 0; k < log_z.size(); ++k) {
+      if (-log_z[k].real() * static_cast<double>(first) <= gone) {
+        ringing.push_back(k);
+      }
+    }
+    powers = Matrix(block_frames, 2 * ringing.size());
+    for (std::size_t i = 0; i < ringing.size(); ++i) {
+      double* const re = &powers.values[2 * i * block_frames];
+      double* const im = re + block_frames;
+      re[0] = 1.0;
+      for (std::size_t known = 1; known < block_frames; known *= 2) {
+        const Complex step = std::exp(log_z[ringing[i]] * static_cast<double>(known));
+        for (std::size_t n = 0; n < known; ++n) {
+          const Complex power = times(step, {re[n], im[n]});
+          re[known + n] = power.real();
+          im[known + n] = power.imag();
+        }
       }
     }
   }
-  std::array<double, block_frames> re;
-  std::array<double, block_frames> im;
-};
+  double start_of(std::size_t block) const {
+    return static_cast<double>(from + block * block_frames);
+  }
 
-std::size_t length_of(std::size_t frames, Complex log_z) {
-  const double alpha = -log_z.real();
-  return alpha * static_cast<double>(frames) > gone
-             ? std::min(frames, static_cast<std::size_t>(gone / alpha) + 1)
-             : frames;
-}
+  std::size_t from;
+  std::size_t size;
+  std::vector<std::size_t> ringing;
+  Matrix powers;   // [sample, real and imaginary part of z^n for each mode that rings]
+  Matrix samples;  // [sample, block]
+};
 
 }  // namespace
 
-void add_damped(std::span<double> samples, Complex c, Complex log_z) {
-  const PowerTable table(log_z);
-  const std::size_t frames = length_of(samples.size(), log_z);
-  for (std::size_t from = 0; from < frames; from += block_frames) {
-    const Complex start = c * std::exp(log_z * static_cast<double>(from));
-    const double re = start.real();
-    const double im = start.imag();
-    double* const block = samples.data() + from;
-    const std::size_t count = std::min(block_frames, frames - from);
-    for (std::size_t n = 0; n < count; ++n) {
-      block[n] += re * table.re[n] - im * table.im[n];
+void add_damped(std::span<double> samples, std::span<const Complex> c,
+                std::span<const Complex> log_z) {
+  constexpr std::size_t step = block_frames * blocks_at_once;
+  for (std::size_t from = 0; from < samples.size(); from += step) {
+    const Stretch stretch(log_z, from, samples.size());
+    if (stretch.ringing.empty()) {
+      return;
+    }
+    Matrix starts(2 * stretch.ringing.size(), blocks_at_once);
+    for (std::size_t b = 0; b < blocks_at_once; ++b) {
+      for (std::size_t i = 0; i < stretch.ringing.size(); ++i) {
+        const std::size_t k = stretch.ringing[i];
+        const Complex start = times(c[k], std::exp(log_z[k] * stretch.start_of(b)));
+        starts(2 * i, b) = start.real();
+        starts(2 * i + 1, b) = -start.imag();
+      }
+    }
+    const Matrix sums = product(stretch.powers, starts);
+    for (std::size_t n = 0; n < stretch.size; ++n) {
+      samples[from + n] += sums.values[n];
     }
   }
 }
 
-Moments moments_of(std::span<const double> samples, Complex log_z) {
-  // Number of independent sums, so that the compiler can keep them in vector registers.
-  constexpr std::size_t lanes = 4;
-  const PowerTable table(log_z);
-  std::array<double, block_frames> place_re;
-  std::array<double, block_frames> place_im;
-  for (std::size_t n = 0; n < block_frames; ++n) {
-    place_re[n] = static_cast<double>(n) * table.re[n];
-    place_im[n] = static_cast<double>(n) * table.im[n];
-  }
-  const std::size_t frames = length_of(samples.size(), log_z);
-  Moments sums{};
-  for (std::size_t from = 0; from < frames; from += block_frames) {
-    std::array<double, lanes> re{};
-    std::array<double, lanes> im{};
-    std::array<double, lanes> n_re{};
-    std::array<double, lanes> n_im{};
-    const double* const block = samples.data() + from;
-    const std::size_t count = std::min(block_frames, frames - from);
-    std::size_t n = 0;
-    for (; n + lanes <= count; n += lanes) {
-      for (std::size_t lane = 0; lane < lanes; ++lane) {
-        re[lane] += block[n + lane] * table.re[n + lane];
-        im[lane] += block[n + lane] * table.im[n + lane];
-        n_re[lane] += block[n + lane] * place_re[n + lane];
-        n_im[lane] += block[n + lane] * place_im[n + lane];
+std::vector<Moments> moments_of(std::span<const double> samples, std::span<const Complex> log_z) {
+  std::vector<Moments> sums(log_z.size());
+  constexpr std::size_t step = block_frames * blocks_at_once;
+  for (std::size_t from = 0; from < samples.size(); from += step) {
+    Stretch stretch(log_z, from, samples.size());
+    if (stretch.ringing.empty()) {
+      break;
+    }
+    std::copy_n(samples.begin() + static_cast<std::ptrdiff_t>(from), stretch.size,
+                std::begin(stretch.samples.values));
+    const Matrix zeroth = transposed_product(stretch.powers, stretch.samples);
+    for (std::size_t n = 0; n < stretch.samples.values.size(); ++n) {
+      stretch.samples.values[n] *= static_cast<double>(n % block_frames);
+    }
+    const Matrix first = transposed_product(stretch.powers, stretch.samples);
+    for (std::size_t i = 0; i < stretch.ringing.size(); ++i) {
+      const std::size_t k = stretch.ringing[i];
+      for (std::size_t b = 0; b < blocks_at_once; ++b) {
+        const Complex power = std::exp(log_z[k] * stretch.start_of(b));
+        const Complex sum(zeroth(2 * i, b), zeroth(2 * i + 1, b));
+        const Complex within(first(2 * i, b), first(2 * i + 1, b));
+        sums[k].zeroth += times(power, sum);
+        sums[k].first += times(power, within + stretch.start_of(b) * sum);
       }
     }
-    for (; n < count; ++n) {
-      re[0] += block[n] * table.re[n];
-      im[0] += block[n] * table.im[n];
-      n_re[0] += block[n] * place_re[n];
-      n_im[0] += block[n] * place_im[n];
-    }
-    const Complex zeroth((re[0] + re[1]) + (re[2] + re[3]), (im[0] + im[1]) + (im[2] + im[3]));
-    const Complex first((n_re[0] + n_re[1]) + (n_re[2] + n_re[3]),
-                        (n_im[0] + n_im[1]) + (n_im[2] + n_im[3]));
-    const auto before = static_cast<double>(from);
-    const Complex power = std::exp(log_z * before);
-    sums.zeroth += times(power, zeroth);
-    sums.first += times(power, first + before * zeroth);
   }
   return sums;
 }

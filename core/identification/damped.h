@@ -19,15 +19,16 @@ inline Complex times(Complex a, Complex b) {
   return {a.real() * b.real() - a.imag() * b.imag(), a.real() * b.imag() + a.imag() * b.real()};
 }
 
-// Adds Re(c z^n) to sample n. O(samples until the mode has decayed)
-void add_damped(std::span<double> samples, Complex c, Complex log_z);
+// Adds the sum over k of Re(c[k] z[k]^n) to sample n. O(samples until the modes have decayed)
+void add_damped(std::span<double> samples, std::span<const Complex> c,
+                std::span<const Complex> log_z);
 
 // Sums over all n of x[n] z^n and of n x[n] z^n.
 struct Moments {
   Complex zeroth;
   Complex first;
 };
-Moments moments_of(std::span<const double> samples, Complex log_z);
+std::vector<Moments> moments_of(std::span<const double> samples, std::span<const Complex> log_z);
 
 // The pole z and z^count.
 struct Powers {

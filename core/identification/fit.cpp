@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "core/linear_algebra/complex.h"
 #include "core/linear_algebra/eigen.h"
@@ -12,8 +13,6 @@ namespace {
 
 // Added to the diagonal, relative to it, so that nearly equal poles keep finite amplitudes.
 constexpr double ridge = 1e-13;
-// A step that reduces the residual's energy by a smaller share ends the iteration.
-constexpr double settled = 1e-7;
 constexpr Complex i_unit{0.0, 1.0};
 
 // Inner products, over all samples, of two columns Re(f n^p z^n) and Re(g n^q w^n). The sums of the
@@ -91,11 +90,11 @@ struct Gradient {
   Gradient(const std::vector<double>& rest, const std::vector<DampedMode>& modes,
            std::size_t channel)
       : linear(2 * modes.size() + 1, 1), poles(2 * modes.size()) {
+    const std::vector<Moments> moments = moments_of(rest, poles_of(modes));
     for (std::size_t k = 0; k < modes.size(); ++k) {
-      const Moments moments = moments_of(rest, modes[k].log_z);
-      linear(2 * k, 0) = moments.zeroth.real();
-      linear(2 * k + 1, 0) = -moments.zeroth.imag();
-      const Complex moved = modes[k].c[channel] * moments.first;
+      linear(2 * k, 0) = moments[k].zeroth.real();
+      linear(2 * k + 1, 0) = -moments[k].zeroth.imag();
+      const Complex moved = modes[k].c[channel] * moments[k].first;
       poles[2 * k] = moved.real();
       poles[2 * k + 1] = -moved.imag();
     }
@@ -108,6 +107,14 @@ struct Gradient {
   Vector poles;
 };
 
+Matrix identity(std::size_t size) {
+  Matrix unit(size, size);
+  for (std::size_t i = 0; i < size; ++i) {
+    unit(i, i) = 1.0;
+  }
+  return unit;
+}
+
 Matrix beside(const Matrix& a, const Matrix& b) {
   Matrix both(a.rows(), a.columns() + b.columns());
   std::copy(std::begin(a.values), std::end(a.values), std::begin(both.values));
@@ -116,6 +123,14 @@ Matrix beside(const Matrix& a, const Matrix& b) {
 }
 
 }  // namespace
+
+std::vector<Complex> poles_of(std::span<const DampedMode> modes) {
+  std::vector<Complex> log_z;
+  for (const DampedMode& mode : modes) {
+    log_z.push_back(mode.log_z);
+  }
+  return log_z;
+}
 
 DampedFit::DampedFit(std::span<const std::vector<double>> sound)
     : sound_(sound), constant_(sound.size()), rest_(sound.begin(), sound.end()) {}
@@ -126,9 +141,11 @@ void DampedFit::find_rest() {
     for (double& x : rest_[c]) {
       x -= constant_[c];
     }
+    std::vector<Complex> subtracted;
     for (const DampedMode& mode : modes_) {
-      add_damped(rest_[c], -mode.c[c], mode.log_z);
+      subtracted.push_back(-mode.c[c]);
     }
+    add_damped(rest_[c], subtracted, poles_of(modes_));
   }
 }
 
@@ -153,7 +170,7 @@ bool DampedFit::set_poles(const std::vector<Complex>& log_z) {
   const Normal normal(modes_, channels, sound_[0].size(), false);
   // The second round is one step of iterative refinement: it removes the rounding error of the
   // first.
-  for (int round = 0; round < 2; ++round) {
+  for (int round = 0; round < 1; ++round) {
     for (std::size_t c = 0; c < channels; ++c) {
       const auto step = positive_solution(normal.linear, Gradient(rest_[c], modes_, c).linear);
       if (!step) {
@@ -169,58 +186,78 @@ bool DampedFit::set_poles(const std::vector<Complex>& log_z) {
   return true;
 }
 
-void DampedFit::remove(const std::vector<bool>& is_removed) {
-  // Smallest relative change of an amplitude for which the residual is updated.
-  constexpr double unmoved = 1e-7;
+std::size_t DampedFit::eliminate(
+    const std::function<std::size_t(const std::vector<double>& drops)>& next) {
+  const std::size_t count = modes_.size();
+  const std::size_t columns = 2 * count + 1;
   const Normal normal(modes_, 0, sound_[0].size(), false);
-  std::vector<std::size_t> kept;  // Columns of the modes that stay.
-  std::vector<std::size_t> gone;
-  for (std::size_t k = 0; k < modes_.size(); ++k) {
-    std::vector<std::size_t>& where = is_removed[k] ? gone : kept;
-    where.insert(where.end(), {2 * k, 2 * k + 1});
+  auto inverse = positive_solution(normal.linear, identity(columns));
+  if (count == 0 || !inverse) {
+    return 0;
   }
-  kept.push_back(2 * modes_.size());
-  Matrix left(kept.size(), kept.size());
-  for (std::size_t j = 0; j < kept.size(); ++j) {
-    for (std::size_t i = 0; i < kept.size(); ++i) {
-      left(i, j) = normal.linear(kept[i], kept[j]);
-    }
-  }
-  Matrix moved(kept.size(), sound_.size());
+  Matrix amplitudes(columns, sound_.size());
   for (std::size_t c = 0; c < sound_.size(); ++c) {
-    for (const std::size_t column : gone) {
-      const Complex amplitude = modes_[column / 2].c[c];
-      const double share = column % 2 == 0 ? amplitude.real() : amplitude.imag();
-      for (std::size_t i = 0; i < kept.size(); ++i) {
-        moved(i, c) += normal.linear(kept[i], column) * share;
+    for (std::size_t k = 0; k < count; ++k) {
+      amplitudes(2 * k, c) = modes_[k].c[c].real();
+      amplitudes(2 * k + 1, c) = modes_[k].c[c].imag();
+    }
+    amplitudes(columns - 1, c) = constant_[c];
+  }
+  // Solves the equation of the block of mode k in the inverse for each channel's amplitude.
+  const auto solved = [&](std::size_t k, double re, double im) {
+    const double a = (*inverse)(2 * k, 2 * k);
+    const double b = (*inverse)(2 * k + 1, 2 * k);
+    const double d = (*inverse)(2 * k + 1, 2 * k + 1);
+    const double determinant = std::max(a * d - b * b, 1e-300);
+    return std::pair((d * re - b * im) / determinant, (a * im - b * re) / determinant);
+  };
+  std::vector<bool> is_removed(count);
+  std::vector<double> drops(count);
+  std::size_t removed = 0;
+  for (;; ++removed) {
+    for (std::size_t k = 0; k < count; ++k) {
+      drops[k] = is_removed[k] ? HUGE_VAL : 0.0;
+      for (std::size_t c = 0; c < sound_.size() && !is_removed[k]; ++c) {
+        const double re = amplitudes(2 * k, c);
+        const double im = amplitudes(2 * k + 1, c);
+        const auto [x, y] = solved(k, re, im);
+        drops[k] += x * re + y * im;
+      }
+    }
+    const std::size_t gone = next(drops);
+    if (gone >= count) {
+      break;
+    }
+    is_removed[gone] = true;
+    // The Schur complement of the removed columns.
+    const auto take = [&](double* column) {
+      const auto [x, y] = solved(gone, column[2 * gone], column[2 * gone + 1]);
+      const double* const first = &(*inverse).values[2 * gone * columns];
+      for (std::size_t i = 0; i < columns; ++i) {
+        column[i] -= x * first[i] + y * first[i + columns];
+      }
+    };
+    for (std::size_t c = 0; c < sound_.size(); ++c) {
+      take(&amplitudes.values[c * columns]);
+    }
+    for (std::size_t j = 0; j < columns; ++j) {
+      if (j / 2 != gone && (j / 2 == count || !is_removed[j / 2])) {
+        take(&inverse->values[j * columns]);
       }
     }
   }
-  const auto step = positive_solution(left, moved);
-  for (std::size_t c = 0; c < sound_.size(); ++c) {
-    for (std::size_t k = 0; k < modes_.size(); ++k) {
-      if (is_removed[k]) {
-        add_damped(rest_[c], modes_[k].c[c], modes_[k].log_z);
+  if (removed > 0) {
+    for (std::size_t c = 0; c < sound_.size(); ++c) {
+      for (std::size_t k = 0; k < count; ++k) {
+        modes_[k].c[c] = {amplitudes(2 * k, c), amplitudes(2 * k + 1, c)};
       }
+      constant_[c] = amplitudes(columns - 1, c);
     }
-    for (std::size_t i = 0; step && i + 1 < kept.size(); i += 2) {
-      DampedMode& mode = modes_[kept[i] / 2];
-      const Complex change((*step)(i, c), (*step)(i + 1, c));
-      if (std::abs(change) > unmoved * std::abs(mode.c[c])) {
-        mode.c[c] += change;
-        add_damped(rest_[c], -change, mode.log_z);
-      }
-    }
-    if (step) {
-      const double change = (*step)(kept.size() - 1, c);
-      constant_[c] += change;
-      for (double& x : rest_[c]) {
-        x -= change;
-      }
-    }
+    std::size_t k = 0;
+    std::erase_if(modes_, [&](const DampedMode&) { return is_removed[k++]; });
+    find_rest();
   }
-  std::size_t k = 0;
-  std::erase_if(modes_, [&](const DampedMode&) { return is_removed[k++]; });
+  return removed;
 }
 
 void DampedFit::set_modes(std::vector<DampedMode> modes) {
@@ -228,7 +265,7 @@ void DampedFit::set_modes(std::vector<DampedMode> modes) {
   find_rest();
 }
 
-void DampedFit::refine(int steps, const Progress& progress) {
+void DampedFit::refine(int steps, double settled, const Progress& progress) {
   const std::size_t count = modes_.size();
   const std::size_t channels = sound_.size();
   const std::size_t frames = sound_[0].size();
@@ -319,12 +356,7 @@ std::vector<DampedDeviation> DampedFit::deviations(bool with_poles) const {
     return all;
   }
   const Normal normal(modes_, channels, sound_[0].size(), with_poles);
-  const std::size_t columns = 2 * count + 1;
-  Matrix unit(columns, columns);
-  for (std::size_t i = 0; i < columns; ++i) {
-    unit(i, i) = 1.0;
-  }
-  const auto inverse = positive_solution(normal.linear, unit);
+  const auto inverse = positive_solution(normal.linear, identity(2 * count + 1));
   if (!inverse) {
     return all;
   }
@@ -341,12 +373,14 @@ std::vector<DampedDeviation> DampedFit::deviations(bool with_poles) const {
     moved.push_back(product(*inverse, normal.mixed[c]));
     schur.values -= transposed_product(normal.mixed[c], moved[c]).values;
   }
-  Matrix pole_unit(2 * count, 2 * count);
-  for (std::size_t i = 0; i < 2 * count; ++i) {
-    pole_unit(i, i) = 1.0;
-    schur(i, i) += ridge * normal.poles(i, i) + 1e-300;
+  // Poles that cannot be distinguished get finite, large deviations.
+  std::optional<Matrix> covariance;
+  for (double added = ridge; !covariance && added < 1e-3; added *= 100.0) {
+    for (std::size_t i = 0; i < 2 * count; ++i) {
+      schur(i, i) += added * normal.poles(i, i) + 1e-300;
+    }
+    covariance = positive_solution(schur, identity(2 * count));
   }
-  const auto covariance = positive_solution(schur, pole_unit);
   for (std::size_t k = 0; k < count; ++k) {
     all[k].alpha = covariance ? std::sqrt((*covariance)(2 * k, 2 * k)) : HUGE_VAL;
     all[k].omega = covariance ? std::sqrt((*covariance)(2 * k + 1, 2 * k + 1)) : HUGE_VAL;

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -18,6 +19,9 @@ struct DampedMode {
   Complex log_z;
   std::vector<Complex> c;  // [channel]
 };
+
+// Returns log z of each mode.
+std::vector<Complex> poles_of(std::span<const DampedMode> modes);
 
 // Standard deviations for noise of variance 1. The deviation of a complex amplitude is the root
 // mean square of the deviations of its two parts.
@@ -35,15 +39,18 @@ class DampedFit {
   // Sets the poles and solves for the best amplitudes. Returns false if the poles cannot be
   // distinguished.
   bool set_poles(const std::vector<Complex>& log_z);
-  // Removes these modes. The other amplitudes are adjusted so that the residual is minimal again;
-  // it must be minimal before the call. O(modes^3 + samples of the modes that change)
-  void remove(const std::vector<bool>& is_removed);
+  // Removes modes one after the other. `next` gets by how much the residual's energy would grow
+  // without each mode, HUGE_VAL for those already removed, and returns the next mode to remove, or
+  // the number of modes to stop. The remaining amplitudes stay the best ones. Returns the number of
+  // removed modes. O(modes^3 + removed * modes^2 + samples * modes)
+  std::size_t eliminate(const std::function<std::size_t(const std::vector<double>& drops)>& next);
   // Sets all modes without fitting.
   void set_modes(std::vector<DampedMode> modes);
 
-  // Moves poles and amplitudes for at most `steps` Gauss-Newton steps. The residual never grows.
+  // Moves poles and amplitudes for at most `steps` Gauss-Newton steps, or until a step reduces the
+  // residual's energy by less than the share `settled`. The residual never grows.
   // O(steps * (modes * samples * channels + modes^3))
-  void refine(int steps, const Progress& progress);
+  void refine(int steps, double settled, const Progress& progress);
 
   const std::vector<DampedMode>& modes() const { return modes_; }
   const std::vector<double>& constant() const { return constant_; }       // [channel]

@@ -19,9 +19,16 @@ constexpr double twin = 0.15;  // Poles closer than this share of their damping 
 // Least squared amplitude over twice its variance; noise reaches this with a probability of e^-21.
 constexpr double chance = 21.0;
 constexpr double deepest_db = -110.0;     // Modes this far below the strongest one are dropped.
-constexpr std::size_t most_fitted = 450;  // Largest number of modes fitted at once.
+constexpr std::size_t least_fitted = 150;  // Number of modes that are fitted at once if found.
+// Largest share of the energy that may be lost by leaving out the contact.
+constexpr double most_left_out = 0.05;
+// Number of modes whose residual is reported, from the largest.
+constexpr std::size_t choices[] = {40, 20, 10, 5};
 // A residual below this share of the sound's energy is rounding error.
 constexpr double rounding = 1e-24;
+// A fit ends when a step reduces the residual's energy by less than this share.
+constexpr double settled = 1e-3;
+constexpr double roughly_settled = 1e-2;  // The same between two searches.
 constexpr double lowest_hz = 15.0;
 constexpr double least_quality = 0.5;
 // Number of standard deviations that a mode must stand above the noise.
@@ -74,6 +81,10 @@ class Noise {
   std::size_t channels_;
 };
 
+double decibels(double power) {
+  return 10.0 * std::log10(std::max(power, 1e-40));
+}
+
 double energy_in(const std::vector<std::vector<double>>& channels) {
   double sum = 0.0;
   for (const std::vector<double>& channel : channels) {
@@ -94,6 +105,15 @@ double energy_of(const DampedMode& mode, std::size_t frames) {
   return square / (4.0 * alpha);
 }
 
+// Returns the squared ratio of the amplitude to its deviation.
+double certainty(const DampedMode& mode, const DampedDeviation& deviation, double variance) {
+  double sum = 0.0;
+  for (std::size_t c = 0; c < mode.c.size(); ++c) {
+    sum += std::norm(mode.c[c]) / (1e-300 + variance * deviation.c[c] * deviation.c[c]);
+  }
+  return sum;
+}
+
 bool are_twins(Complex a, Complex b, double share, std::size_t frames) {
   const double near =
       std::max(share * std::min(-a.real(), -b.real()), 0.02 / static_cast<double>(frames));
@@ -103,8 +123,10 @@ bool are_twins(Complex a, Complex b, double share, std::size_t frames) {
 // Fits all numbers of a growing set of modes.
 class Search {
  public:
-  Search(const std::vector<std::vector<double>>& sound, const Progress& progress)
-      : sound_(sound), progress_(progress), fit_(sound) {
+  // Keeps `least` to `most` modes: more than `least` only if they stand above the noise.
+  Search(const std::vector<std::vector<double>>& sound, std::size_t least, std::size_t most,
+         const Progress& progress)
+      : sound_(sound), least_(least), most_(most), progress_(progress), fit_(sound) {
     fit_.set_poles({});  // Starts with the constant alone.
     sound_energy_ = fit_.rest_energy();
   }
@@ -133,16 +155,61 @@ class Search {
     }
     progress_.stage("fitting the modes to the sound");
     add(strongest(std::move(found), start));
-    drop_insignificant();
-    prune(2, 3);
+    for (int round = 0; round < 12 && drop_unlikely() > 0; ++round) {
+    }
+    fit_.refine(2, roughly_settled, progress_);
+    if (drop_unlikely() > 0) {
+      fit_.refine(2, roughly_settled, progress_);
+    }
   }
 
-  // Starts from these poles instead of a search.
-  void start(const std::vector<Complex>& poles) { fit_.set_poles(poles); }
+  // Starts from these poles instead of a search, without those that noise could explain.
+  void start(const std::vector<Complex>& poles) {
+    fit_.set_poles(poles);
+    for (int round = 0; round < 20 && drop_unlikely() + drop_uncertain() > 0; ++round) {
+    }
+  }
 
   void finish() {
     progress_.stage("fitting the modes to the sound");
-    prune(20, 10);
+    fit_.refine(10, settled, progress_);
+    keep_likely(least_);
+  }
+
+  // Removes the modes for which `is_wrong` holds.
+  void remove(const std::vector<bool>& is_wrong) {
+    fit_.eliminate([&](const std::vector<double>& drops) {
+      std::size_t k = 0;
+      while (k < drops.size() && !(is_wrong[k] && drops[k] < HUGE_VAL)) {
+        ++k;
+      }
+      return k;
+    });
+  }
+
+  // Keeps the `count` modes that explain the most together, not counting those for which `is_kept`
+  // holds. The poles stay.
+  void keep_best(std::size_t count, std::vector<bool> is_kept) {
+    is_kept.resize(fit_.modes().size());
+    auto left = static_cast<std::size_t>(std::count(is_kept.begin(), is_kept.end(), false));
+    fit_.eliminate([&](const std::vector<double>& drops) {
+      std::size_t least = drops.size();
+      for (std::size_t k = 0; k < drops.size() && left > count; ++k) {
+        if (!is_kept[k] && (least == drops.size() || drops[k] < drops[least])) {
+          least = k;
+        }
+      }
+      left -= left > count ? 1 : 0;
+      return least;
+    });
+  }
+
+  // Keeps only modes that stand above the noise, but at least this many.
+  void keep_likely(std::size_t least) {
+    least_ = least;
+    for (int round = 0; round < 20 && drop_unlikely() + drop_uncertain() > 0; ++round) {
+      fit_.refine(10, settled, progress_);
+    }
   }
 
   std::size_t frames() const { return sound_[0].size(); }
@@ -151,17 +218,19 @@ class Search {
   // Returns the poles that would each explain the most energy on their own.
   std::vector<Complex> strongest(std::vector<Complex> found,
                                  const std::vector<std::vector<double>>& start) const {
-    const std::size_t room = most_fitted - std::min(most_fitted, fit_.modes().size());
+    const std::size_t room = most_ * 3 / 2;
     if (found.size() <= room) {
       return found;
     }
     std::vector<std::pair<double, Complex>> ranked;
     for (const Complex log_z : found) {
-      double square = 0.0;
-      for (const std::vector<double>& channel : start) {
-        square += std::norm(moments_of(channel, log_z).zeroth);
+      ranked.emplace_back(0.0, log_z);
+    }
+    for (const std::vector<double>& channel : start) {
+      const std::vector<Moments> moments = moments_of(channel, found);
+      for (std::size_t k = 0; k < found.size(); ++k) {
+        ranked[k].first += std::norm(moments[k].zeroth) * found[k].real();
       }
-      ranked.emplace_back(-square * -log_z.real(), log_z);
     }
     std::sort(ranked.begin(), ranked.end(),
               [](const auto& a, const auto& b) { return a.first < b.first; });
@@ -173,10 +242,7 @@ class Search {
   }
 
   void add(const std::vector<Complex>& found) {
-    std::vector<Complex> known;
-    for (const DampedMode& mode : fit_.modes()) {
-      known.push_back(mode.log_z);
-    }
+    const std::vector<Complex> known = poles_of(fit_.modes());
     for (double share = twin; share < 20.0; share *= 4.0) {
       std::vector<Complex> all = known;
       for (const Complex log_z : found) {
@@ -192,93 +258,97 @@ class Search {
     fit_.set_poles(known);
   }
 
-  // Alternates between fitting and removing until every mode stands above the noise and is distinct
-  // from its neighbours.
-  void prune(int steps, int rounds) {
-    fit_.refine(steps, progress_);
-    int dropped = 0;
-    while (dropped < rounds && drop_unlikely(true, Noise(fit_.rest()))) {
-      fit_.refine(2, progress_);
-      ++dropped;
-    }
-    if (dropped > 0) {
-      fit_.refine(steps, progress_);
-    }
-  }
-
-  // Removes modes that noise could explain, the least likely first.
-  void drop_insignificant() {
-    for (int round = 0; round < 12; ++round) {
-      const Noise noise(fit_.rest());
-      int drops = 0;
-      while (drops < 4 && drop_unlikely(false, noise)) {
-        ++drops;
-      }
-      if (drops == 0) {
-        return;
-      }
-    }
-  }
-
-  // Removes some of the insignificant modes and returns whether there were any. `with_poles` treats
-  // the poles as uncertain, too. Of a group of close neighbours, which can all look insignificant
-  // beside each other, only one is removed at a time.
-  bool drop_unlikely(bool with_poles, const Noise& noise) {
+  // Removes modes that are so close to others that their amplitudes are not known. Of a group of
+  // neighbours only one is removed at a time. Returns their number.
+  std::size_t drop_uncertain() {
     const std::vector<DampedMode>& modes = fit_.modes();
-    if (modes.empty()) {
-      return false;
-    }
-    const std::vector<DampedDeviation> deviations = fit_.deviations(with_poles);
-    double loudest = 0.0;
-    for (const DampedMode& mode : modes) {
-      loudest = std::max(loudest, energy_of(mode, frames()));
-    }
-    const double least = loudest * std::pow(10.0, deepest_db / 10.0);
-    const double wanted = chance + static_cast<double>(sound_.size() - 1);
-    // Significance and index of each candidate.
-    std::vector<std::pair<double, std::size_t>> unlikely;
-    const double resolved = 8.0 * std::numbers::pi / static_cast<double>(frames());
-    const auto are_neighbours = [&](Complex a, Complex b) {
-      return std::fabs(a.imag() - b.imag()) < 4.0 * std::max(-a.real(), -b.real()) + resolved;
-    };
+    const std::vector<DampedDeviation> deviations = fit_.deviations(true);
+    const Noise noise(fit_.rest());
+    std::vector<std::pair<double, std::size_t>> uncertain;  // certainty, mode
     for (std::size_t k = 0; k < modes.size(); ++k) {
-      // A peak that is not exactly a damped sinusoid leaves a large residual around it, but it is
-      // still a peak. Any other mode near it must exceed that residual.
-      const bool is_peak = std::none_of(modes.begin(), modes.end(), [&](const DampedMode& other) {
-        return are_neighbours(other.log_z, modes[k].log_z) &&
-               energy_of(other, frames()) > energy_of(modes[k], frames());
-      });
-      const double variance =
-          is_peak ? noise.floor(modes[k].log_z) : noise.variance(modes[k].log_z);
-      double likelihood = 0.0;
-      for (std::size_t c = 0; c < modes[k].c.size(); ++c) {
-        const double deviation = deviations[k].c[c];
-        likelihood += std::norm(modes[k].c[c]) / (1e-300 + 2.0 * deviation * deviation * variance);
-      }
-      likelihood = energy_of(modes[k], frames()) < least ? 0.0 : likelihood;
-      if (!(likelihood >= wanted)) {
-        unlikely.emplace_back(likelihood, k);
+      const double certain = certainty(modes[k], deviations[k], noise.variance(modes[k].log_z));
+      if (!(certain >= sure * sure)) {
+        uncertain.emplace_back(certain, k);
       }
     }
-    if (unlikely.empty()) {
-      return false;
-    }
-    std::sort(unlikely.begin(), unlikely.end());
+    std::sort(uncertain.begin(), uncertain.end());
     std::vector<bool> is_dropped(modes.size());
-    for (const auto& row : unlikely) {
+    std::size_t left = modes.size();
+    for (const auto& row : uncertain) {
       const std::size_t k = row.second;
-      bool has_gone_beside = false;
-      for (std::size_t j = 0; j < modes.size(); ++j) {
-        has_gone_beside =
-            has_gone_beside || (is_dropped[j] && are_neighbours(modes[j].log_z, modes[k].log_z));
+      bool has_gone_beside = left <= least_;
+      for (std::size_t j = 0; j < modes.size() && !has_gone_beside; ++j) {
+        has_gone_beside = is_dropped[j] && are_neighbours(modes[j].log_z, modes[k].log_z);
       }
       is_dropped[k] = !has_gone_beside;
+      left -= has_gone_beside ? 0 : 1;
     }
-    fit_.remove(is_dropped);
-    return true;
+    remove(is_dropped);
+    return is_dropped.size() - left;
+  }
+
+  bool are_neighbours(Complex a, Complex b) const {
+    const double resolved = 8.0 * std::numbers::pi / static_cast<double>(frames());
+    return std::fabs(a.imag() - b.imag()) < 4.0 * std::max(-a.real(), -b.real()) + resolved;
+  }
+
+  // Removes modes that noise could explain, the least likely first. A mode counts by how much more
+  // the residual would be without it, relative to the noise around it. Returns their number.
+  std::size_t drop_unlikely() {
+    const std::vector<DampedMode>& modes = fit_.modes();
+    const Noise noise(fit_.rest());
+    std::vector<std::vector<std::size_t>> neighbours(modes.size());
+    std::vector<double> variance;
+    std::vector<double> floor;
+    for (std::size_t k = 0; k < modes.size(); ++k) {
+      variance.push_back(noise.variance(modes[k].log_z));
+      floor.push_back(noise.floor(modes[k].log_z));
+      for (std::size_t j = 0; j < modes.size(); ++j) {
+        if (are_neighbours(modes[k].log_z, modes[j].log_z)) {
+          neighbours[k].push_back(j);
+        }
+      }
+    }
+    const double wanted = chance + static_cast<double>(sound_.size() - 1);
+    std::size_t left = modes.size();
+    return fit_.eliminate([&](const std::vector<double>& drops) {
+      if (left <= least_) {
+        return drops.size();
+      }
+      if (left > most_) {
+        --left;
+        return static_cast<std::size_t>(std::min_element(drops.begin(), drops.end()) -
+                                        drops.begin());
+      }
+      double most = 0.0;
+      for (const double drop : drops) {
+        most = std::max(most, drop < HUGE_VAL ? drop : 0.0);
+      }
+      const double least_drop = most * std::pow(10.0, deepest_db / 10.0);
+      std::size_t next = drops.size();
+      double least = wanted;
+      for (std::size_t k = 0; k < drops.size(); ++k) {
+        // A peak that is not exactly a damped sinusoid leaves a large residual around it, but it is
+        // still a peak. Any other mode near it must exceed that residual.
+        const bool is_peak =
+            std::none_of(neighbours[k].begin(), neighbours[k].end(), [&](std::size_t j) {
+              return drops[j] > drops[k] && drops[j] < HUGE_VAL;
+            });
+        const double likelihood =
+            drops[k] < least_drop ? 0.0 : 0.5 * drops[k] / (is_peak ? floor[k] : variance[k]);
+        if (!(likelihood >= least) && drops[k] < HUGE_VAL) {
+          least = likelihood;
+          next = k;
+        }
+      }
+      --left;
+      return next;
+    });
   }
 
   const std::vector<std::vector<double>>& sound_;
+  std::size_t least_;
+  std::size_t most_;
   const Progress& progress_;
   DampedFit fit_;
   double sound_energy_ = 0.0;
@@ -349,6 +419,20 @@ struct Found {
 
 enum class Fate { kept, steady, unfit };
 
+// Returns the energy that the modes leave when they are extrapolated back by `head` samples.
+double rest_from_blow(const DampedFit& later, const std::vector<std::vector<double>>& sound,
+                      std::size_t head) {
+  std::vector<DampedMode> modes = later.modes();
+  for (DampedMode& mode : modes) {
+    for (Complex& c : mode.c) {
+      c *= std::exp(-mode.log_z * static_cast<double>(head));
+    }
+  }
+  DampedFit whole(sound);
+  whole.set_modes(std::move(modes));
+  return whole.rest_energy();
+}
+
 // Extrapolates the mode back in time.
 void extrapolate_back(Found& found, double samples) {
   for (std::size_t c = 0; c < found.mode.c.size(); ++c) {
@@ -368,14 +452,14 @@ bool is_too_loud(const Found& found, double peak) {
                      [&](Complex c) { return std::abs(c) > much_more * peak; });
 }
 
-Fate fate_of(const Found& found, double rate_hz, std::size_t frames) {
+Fate fate_of(const Found& found, double rate_hz, std::size_t frames, bool must_be_known) {
   const double alpha = -found.mode.log_z.real();
   const double omega = found.mode.log_z.imag();
   const bool is_seen_to_decay = alpha > sure * found.deviation.alpha;
   if ((!is_seen_to_decay && alpha * static_cast<double>(frames) < 1.0) || alpha * rate_hz < 0.05) {
     return Fate::steady;
   }
-  const bool is_known = found.deviation.alpha < alpha;
+  const bool is_known = !must_be_known || found.deviation.alpha < alpha;
   const bool rings = is_known && omega > 2.0 * std::numbers::pi * lowest_hz / rate_hz &&
                      omega < 0.999 * std::numbers::pi && omega > 2.0 * least_quality * alpha &&
                      omega <= 2.0 * std::numbers::pi * highest_mode_hz / rate_hz;
@@ -424,6 +508,19 @@ double time_of_impulse(const std::vector<Found>& all, double rate_hz) {
   return best;
 }
 
+// Returns what the best modes leave, for several numbers of them.
+std::vector<Unexplained> try_choices(Search search, double energy) {
+  std::vector<Unexplained> tried;
+  for (const std::size_t count : choices) {
+    if (search.fit().modes().size() >= count) {
+      search.keep_likely(count);
+      search.keep_best(count, {});
+      tried.insert(tried.begin(), {count, decibels(search.fit().rest_energy() / energy)});
+    }
+  }
+  return tried;
+}
+
 IdentifiedMode measured(const Found& found, double rate_hz, double time_zero) {
   constexpr double last_digit = 2.3e-16;
   const double alpha = -found.mode.log_z.real();
@@ -446,10 +543,6 @@ IdentifiedMode measured(const Found& found, double rate_hz, double time_zero) {
                               : std::numbers::pi});
   }
   return mode;
-}
-
-double decibels(double power) {
-  return 10.0 * std::log10(std::max(power, 1e-40));
 }
 
 std::vector<OctaveResidual> by_octave(const std::vector<std::vector<double>>& sound,
@@ -510,42 +603,70 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
                       .analysed_s = static_cast<double>(blow->channels[0].size()) / rate_hz};
   warn_of_recording(*blow, made);
   made.sound = std::move(blow->channels);
-  std::optional<Search> search(std::in_place, made.sound, progress);
+  const std::size_t least = std::max(choices[0], options.least_modes);
+  const std::size_t most = std::max({least_fitted, least, options.most_modes});
+  std::optional<Search> search(std::in_place, made.sound, least, most, progress);
   search_all(*search, rate_hz);
   // A residual at the level of rounding errors contains no blow.
   const double rest_share = search->fit().rest_energy() / std::max(energy_in(made.sound), 1e-300);
   if (const std::size_t head = blow_frames(search->fit().rest(), rate_hz);
       head > 0 && rest_share > rounding) {
-    std::vector<Complex> poles;
-    for (const DampedMode& mode : search->fit().modes()) {
-      poles.push_back(mode.log_z);
-    }
-    for (std::vector<double>& channel : made.sound) {
+    std::vector<std::vector<double>> later = made.sound;
+    for (std::vector<double>& channel : later) {
       channel.erase(channel.begin(), channel.begin() + static_cast<std::ptrdiff_t>(head));
     }
-    blow->skipped += head;
-    search.emplace(made.sound, progress);
-    search->start(poles);
-    search->finish();
+    Search free(later, 0, most, progress);
+    free.start(poles_of(search->fit().modes()));
+    const double rest = rest_from_blow(free.fit(), made.sound, head);
+    if (rest < search->fit().rest_energy() + most_left_out * energy_in(made.sound)) {
+      made.sound = std::move(later);
+      blow->skipped += head;
+      search.emplace(made.sound, least, most, progress);
+      search->start(poles_of(free.fit().modes()));
+      search->finish();
+      if (free.fit().modes().size() < options.least_modes) {
+        search_all(*search, rate_hz);
+      }
+    }
   }
-  std::vector<Found> kept;
-  double steady_hz = 0.0;
-  double steady_energy = 0.0;
-  std::size_t steady = 0;
   const std::size_t frames = made.sound[0].size();
   const auto skipped = static_cast<double>(blow->skipped);
   made.skipped_s = skipped / rate_hz;
   made.analysed_s = static_cast<double>(frames) / rate_hz;
-  for (Found& found : all_found(search->fit())) {
-    const Fate fate = fate_of(found, rate_hz, frames);
-    extrapolate_back(found, skipped);
-    if (fate == Fate::kept && !is_too_loud(found, blow->peak)) {
-      kept.push_back(std::move(found));
-    } else if (fate == Fate::steady) {
+  const auto fates = [&](bool must_be_known) {
+    std::vector<Fate> all;
+    for (Found& found : all_found(search->fit())) {
+      all.push_back(fate_of(found, rate_hz, frames, must_be_known));
+      extrapolate_back(found, skipped);
+      all.back() = all.back() == Fate::kept && is_too_loud(found, blow->peak) ? Fate::unfit
+                                                                              : all.back();
+    }
+    return all;
+  };
+  const auto are = [](const std::vector<Fate>& all, Fate fate) {
+    std::vector<bool> is(all.size());
+    std::transform(all.begin(), all.end(), is.begin(), [&](Fate each) { return each == fate; });
+    return is;
+  };
+  search->remove(are(fates(false), Fate::unfit));
+  made.choices = try_choices(*search, std::max(energy_in(made.sound), 1e-300));
+  search->keep_likely(options.least_modes);
+  search->keep_best(options.most_modes, are(fates(false), Fate::steady));
+  std::vector<Found> kept;
+  double steady_hz = 0.0;
+  double steady_energy = 0.0;
+  std::size_t steady = 0;
+  const std::vector<Fate> fate = fates(options.least_modes == 0);
+  std::vector<Found> all = all_found(search->fit());
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    extrapolate_back(all[k], skipped);
+    if (fate[k] == Fate::kept) {
+      kept.push_back(std::move(all[k]));
+    } else if (fate[k] == Fate::steady) {
       ++steady;
-      if (energy_of(found.mode, frames) > steady_energy) {
-        steady_energy = energy_of(found.mode, frames);
-        steady_hz = found.mode.log_z.imag() * rate_hz / (2.0 * std::numbers::pi);
+      if (energy_of(all[k].mode, frames) > steady_energy) {
+        steady_energy = energy_of(all[k].mode, frames);
+        steady_hz = all[k].mode.log_z.imag() * rate_hz / (2.0 * std::numbers::pi);
       }
     }
   }
@@ -553,7 +674,7 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
     return energy_of(a.mode, frames) > energy_of(b.mode, frames);
   });
   std::size_t count = 0;
-  while (count < std::min(kept.size(), options.most_modes) &&
+  while (count < kept.size() &&
          energy_of(kept[count].mode, frames) >=
              energy_of(kept[0].mode, frames) * std::pow(10.0, options.floor_db / 10.0)) {
     ++count;
@@ -565,7 +686,11 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
         std::string(" without a measurable decay ") + (steady == 1 ? "is" : "are") + " left out, " +
         (steady == 1 ? "" : "the loudest ") + "at " + number("%.1f Hz", steady_hz));
   }
-  if (kept.empty()) {
+  // To say that something rings takes more than to tell its modes apart.
+  const bool rings = std::any_of(kept.begin(), kept.end(), [&](const Found& found) {
+    return certainty(found.mode, found.deviation, 1.0) >= 2.0 * chance;
+  });
+  if (!rings) {
     return Error{"nothing in it rings: no decaying tone stands above its noise"};
   }
   std::sort(kept.begin(), kept.end(), [](const Found& a, const Found& b) {

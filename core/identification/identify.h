@@ -38,8 +38,15 @@ struct OctaveResidual {
   double residual_db = 0.0;
 };
 
+// Energy that the best `modes` modes leave unexplained, relative to the sound.
+struct Unexplained {
+  std::size_t modes = 0;
+  double residual_db = 0.0;
+};
+
 struct IdentifyOptions {
-  std::size_t most_modes = 400;  // Keeps this many modes, those with the most energy.
+  std::size_t most_modes = 150;  // Keeps this many modes, those that explain the most together.
+  std::size_t least_modes = 0;   // Keeps this many modes, even those that noise could explain.
   double floor_db = -70.0;       // Lowest energy of a mode, relative to the strongest one.
 };
 
@@ -52,6 +59,7 @@ struct Identification {
   std::vector<IdentifiedMode> modes;  // Sorted by ascending frequency.
   // Energy that the modes leave unexplained, relative to the sound, constants excluded.
   double residual_db = 0.0;
+  std::vector<Unexplained> choices;  // The same for 5, 10, 20 and 40 modes, where there are so many.
   std::vector<OctaveResidual> octaves;
   std::vector<std::string> warnings;          // Warnings about the recording and the result.
   std::vector<std::vector<double>> sound;     // The analysed sound.

@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t taps_per_step = 14;  // Filter taps per step of decimation.
 constexpr double kaiser_beta = 12.0;  // Kaiser window with 118 dB between passband and stopband.
 constexpr double cutoff = 0.4;  // Cutoff as a share of the lower rate; poles are kept within 0.25.
-constexpr std::size_t longest_window = 128;
+constexpr std::size_t longest_window = 96;
 constexpr std::size_t least_window = 32;
 constexpr std::size_t least_frames = 96;  // Shortest usable band signal.
 // Frames per energy measurement, which decides how long a band rings.

@@ -50,8 +50,9 @@ int body_command(const BodyRequest& request) {
   BodyOptions options = common(request.recording);
   options.picture = request.picture;
   options.mass = request.mass;
-  options.most_modes =
-      request.modes ? static_cast<std::size_t>(*request.modes) : options.most_modes;
+  if (request.modes) {
+    options.modes = static_cast<std::size_t>(*request.modes);
+  }
   return recording_body(options);
 }
 

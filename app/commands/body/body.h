@@ -19,7 +19,7 @@ struct BodyOptions {
   std::string picture;  // .svg; empty: none
   bool force = false;   // overwrites existing files
   bool as_json = false;
-  std::size_t most_modes = 400;
+  std::optional<std::size_t> modes;  // all that stand above the noise if not given
   double floor_db = -70.0;  // energy of the weakest mode, relative to the strongest
   double mass = 40.0;       // mass of every mode
 };

@@ -77,7 +77,7 @@ int recording_body(const BodyOptions& options) {
   }
   const Progress progress = report_stages(options.input);
   const auto found = identify_recording(
-      options.input, {.most_modes = options.most_modes, .floor_db = options.floor_db}, progress);
+      options.input, {.most_modes = options.modes.value_or(IdentifyOptions().most_modes), .least_modes = options.modes.value_or(0), .floor_db = options.floor_db}, progress);
   if (!found) {
     return reject(found.error().message);
   }
