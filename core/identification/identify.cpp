@@ -20,6 +20,8 @@ constexpr double twin = 0.15;  // Poles closer than this share of their damping 
 constexpr double chance = 21.0;
 constexpr double deepest_db = -110.0;     // Modes this far below the strongest one are dropped.
 constexpr std::size_t least_fitted = 150;  // Number of modes that are fitted at once if found.
+// Modes that leave less than this share of the energy are not those of noise.
+constexpr double most_of_noise = 0.8;
 // Largest share of the energy that may be lost by leaving out the contact.
 constexpr double most_left_out = 0.05;
 // Number of modes whose residual is reported, from the largest.
@@ -267,7 +269,7 @@ class Search {
     std::vector<std::pair<double, std::size_t>> uncertain;  // certainty, mode
     for (std::size_t k = 0; k < modes.size(); ++k) {
       const double certain = certainty(modes[k], deviations[k], noise.variance(modes[k].log_z));
-      if (!(certain >= sure * sure)) {
+      if (!(certain >= 1.0)) {
         uncertain.emplace_back(certain, k);
       }
     }
@@ -686,11 +688,13 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
         std::string(" without a measurable decay ") + (steady == 1 ? "is" : "are") + " left out, " +
         (steady == 1 ? "" : "the loudest ") + "at " + number("%.1f Hz", steady_hz));
   }
-  // To say that something rings takes more than to tell its modes apart.
-  const bool rings = std::any_of(kept.begin(), kept.end(), [&](const Found& found) {
-    return certainty(found.mode, found.deviation, 1.0) >= 2.0 * chance;
-  });
-  if (!rings) {
+  // The modes of noise are uncertain and explain little of it.
+  const double rest_now = search->fit().rest_energy() / std::max(energy_in(made.sound), 1e-300);
+  const bool rings = options.least_modes > 0 || rest_now < most_of_noise ||
+                     std::any_of(kept.begin(), kept.end(), [&](const Found& found) {
+                       return certainty(found.mode, found.deviation, 1.0) >= 2.0 * chance;
+                     });
+  if (kept.empty() || !rings) {
     return Error{"nothing in it rings: no decaying tone stands above its noise"};
   }
   std::sort(kept.begin(), kept.end(), [](const Found& a, const Found& b) {
