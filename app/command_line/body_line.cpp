@@ -25,6 +25,7 @@ const char* const examples =
     "  becomes a chain of masses and springs with the same response at one place.\n"
     "Examples:\n"
     "  ressort body bowl.wav -o bowl.mdl --modes 20 --picture bowl.svg\n"
+    "  ressort body tom.wav -o Tom.toml     # a preset with its model, Tom.mdl, and its noise\n"
     "  ressort body bell.stl --material bronze --scale 0.001 --place rim=150,0,0 -o bell.mdl\n"
     "  ressort body bar.obj --young 11e9 --poisson 0.25 --density 750 --loss 0.01 -o bar.mdl\n"
     "  ressort body drum.mdl -o drum_body.mdl\n"
@@ -138,8 +139,10 @@ void add_body(CLI::App& app, BodyRequest& request, int& code) {
                    ".svg of the spectrum of a recording, or of the mode shapes of a solid")
       ->type_name("FILE");
   command
-      ->add_option("--modes", request.modes,
-                   "largest number of modes (default: 400; 40 of a solid; all of a model)")
+      ->add_option(
+          "--modes", request.modes,
+          "number of modes (default: at most 150 of a recording, 400 of statistics, 40 of a "
+          "solid; all of a model)")
       ->check(within(1, 2000));
   command
       ->add_option("-M,--mass", request.mass,

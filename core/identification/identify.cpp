@@ -619,13 +619,16 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
     }
     Search free(later, 0, most, progress);
     free.start(poles_of(search->fit().modes()));
-    const double rest = rest_from_blow(free.fit(), made.sound, head);
-    if (rest < search->fit().rest_energy() + most_left_out * energy_in(made.sound)) {
+    const double most_rest = search->fit().rest_energy() + most_left_out * energy_in(made.sound);
+    const auto continues_back = [&] {
+      return rest_from_blow(free.fit(), made.sound, head) < most_rest;
+    };
+    // The fit moves the poles, so the second test can fail although the first one did not.
+    if (continues_back() && (free.finish(), continues_back())) {
       made.sound = std::move(later);
       blow->skipped += head;
       search.emplace(made.sound, least, most, progress);
       search->start(poles_of(free.fit().modes()));
-      search->finish();
       if (free.fit().modes().size() < options.least_modes) {
         search_all(*search, rate_hz);
       }
@@ -720,6 +723,9 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
   made.residual_db =
       decibels(search->fit().rest_energy() / std::max(energy_in(made.sound), 1e-300));
   made.octaves = by_octave(made.sound, made.residual, rate_hz);
+  if (made.modes.size() < options.least_modes) {
+    made.warnings.push_back("only " + std::to_string(made.modes.size()) + " modes were found");
+  }
   if (made.residual_db > -6.0) {
     made.warnings.push_back(
         "the modes explain only " +

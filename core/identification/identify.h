@@ -2,8 +2,8 @@
 //
 // ESPRIT in sub-bands finds the poles in three passes: first the long-ringing ones, then the
 // strongly damped ones in the residual of the first moments, then once more in the residual of the
-// whole sound. After each pass all numbers are fitted again to the whole sound. Modes that do not
-// stand above the surrounding noise are removed.
+// whole sound. After each pass all numbers are fitted again to the whole sound. Modes that explain
+// no more than the surrounding noise would are removed.
 #pragma once
 
 #include <cstddef>
@@ -59,7 +59,7 @@ struct Identification {
   std::vector<IdentifiedMode> modes;  // Sorted by ascending frequency.
   // Energy that the modes leave unexplained, relative to the sound, constants excluded.
   double residual_db = 0.0;
-  std::vector<Unexplained> choices;  // The same for 5, 10, 20 and 40 modes, where there are so many.
+  std::vector<Unexplained> choices;  // The same for 5, 10, 20 and 40 modes, if there are so many.
   std::vector<OctaveResidual> octaves;
   std::vector<std::string> warnings;          // Warnings about the recording and the result.
   std::vector<std::vector<double>> sound;     // The analysed sound.

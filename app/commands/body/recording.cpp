@@ -76,8 +76,12 @@ int recording_body(const BodyOptions& options) {
     return reject(options.picture + ": " + found.error().message);
   }
   const Progress progress = report_stages(options.input);
-  const auto found = identify_recording(
-      options.input, {.most_modes = options.modes.value_or(IdentifyOptions().most_modes), .least_modes = options.modes.value_or(0), .floor_db = options.floor_db}, progress);
+  const auto found =
+      identify_recording(options.input,
+                         {.most_modes = options.modes.value_or(IdentifyOptions().most_modes),
+                          .least_modes = options.modes.value_or(0),
+                          .floor_db = options.floor_db},
+                         progress);
   if (!found) {
     return reject(found.error().message);
   }
@@ -92,8 +96,20 @@ int recording_body(const BodyOptions& options) {
     }
   }
   const std::string label = label_of_file(options.output.empty() ? options.input : options.output);
-  const std::string model = body_model(*found, label, source, options.mass);
-  if (!options.output.empty()) {
+  std::string model = body_model(*found, label, source, options.mass);
+  if (options.output.ends_with(".toml")) {
+    const std::string file = options.output.substr(0, options.output.size() - 5) + ".mdl";
+    const std::vector<NoiseBand> noise = noise_bands(*found);
+    const std::string preset =
+        played_preset(*found, noise, file.substr(file.rfind('/') + 1), source);
+    model = played_model(*found, noise, label, source, options.mass);
+    if (const int code = write_output(file, model, options.force)) {
+      return code;
+    }
+    if (const int code = write_output(options.output, preset, options.force)) {
+      return code;
+    }
+  } else if (!options.output.empty()) {
     if (const int code = write_output(options.output, model, options.force)) {
       return code;
     }
@@ -111,6 +127,7 @@ int recording_body(const BodyOptions& options) {
     std::printf("%s: %s %s Hz, residual %s dB\n", options.output.c_str(),
                 counted(found->modes.size(), "mode", "modes").c_str(), where.c_str(),
                 fixed(found->residual_db, 1).c_str());
+    std::fputs(choices_of(*found, "", "\n").c_str(), stdout);
   }
   return exit_code::done;
 }

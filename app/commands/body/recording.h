@@ -5,6 +5,7 @@
 
 #include "app/plot/plot.h"
 #include "core/identification/identify.h"
+#include "core/identification/noise_bands.h"
 #include "core/progress.h"
 #include "core/result.h"
 
@@ -23,6 +24,17 @@ std::string label_of_file(const std::string& path);
 // position output per channel.
 std::string body_model(const Identification& found, const std::string& label,
                        const std::string& source, double mass);
+
+// Return a model of a body with knobs, one place and input for each band of noise, and a preset
+// that plays this model: keys strike it and play the noise.
+std::string played_model(const Identification& found, const std::vector<NoiseBand>& noise,
+                         const std::string& label, const std::string& source, double mass);
+std::string played_preset(const Identification& found, const std::vector<NoiseBand>& noise,
+                          const std::string& model, const std::string& source);
+
+// Returns the residuals that fewer or more modes would leave, as a sentence, or nothing.
+std::string choices_of(const Identification& found, const std::string& before,
+                       const std::string& after);
 
 // Returns modes, residual and warnings as one JSON object.
 std::string identification_json(const Identification& found, double mass);

@@ -62,11 +62,11 @@ std::string one_line(const std::string& text) {
 
 std::string header(const Identification& found, const std::string& source) {
   const std::size_t channels = found.sound.size();
-  std::string text =
-      "# The modes of " + one_line(source) + ": " + counted(found.modes.size(), "mode", "modes") +
-      ", from " + number("%.4g", found.analysed_s) + " s after the blow at " +
-      number("%.4g", found.onset_s) +
-      " s.\n# Residual without them: " + number("%.1f", found.residual_db) + " dB of all";
+  std::string text = "# The modes of " + one_line(source) + ": " +
+                     counted(found.modes.size(), "mode", "modes") + ", found in " +
+                     number("%.4g", found.analysed_s) + " s from the blow at " +
+                     number("%.4g", found.onset_s) + " s.\n" + choices_of(found, "# ", "\n") +
+                     "# Residual without them: " + number("%.1f", found.residual_db) + " dB of all";
   const double quiet = -100.0;  // octaves below this level contain nothing to explain
   for (const OctaveResidual& octave : found.octaves) {
     if (octave.level_db > quiet) {
@@ -87,6 +87,17 @@ std::string header(const Identification& found, const std::string& source) {
 }
 
 }  // namespace
+
+std::string choices_of(const Identification& found, const std::string& before,
+                       const std::string& after) {
+  std::string text;
+  for (const Unexplained& choice : found.choices) {
+    text += (text.empty() ? "" : ", ") + std::to_string(choice.modes) + " modes " +
+            number("%.1f", choice.residual_db) + " dB";
+  }
+  return text.empty() ? text
+                      : before + "Residual of the best modes (--modes): " + text + "." + after;
+}
 
 std::string label_of_file(const std::string& path) {
   std::string label = std::filesystem::path(path).stem().string();
@@ -164,6 +175,10 @@ std::string identification_json(const Identification& found, double mass) {
                        {"level_db", octave.level_db},
                        {"residual_db", octave.residual_db}});
   }
+  json choices = json::array();
+  for (const Unexplained& choice : found.choices) {
+    choices.push_back({{"modes", choice.modes}, {"residual_db", choice.residual_db}});
+  }
   const json out{{"rate_hz", found.rate_hz},
                  {"onset_s", found.onset_s},
                  {"time_zero_s", found.time_zero_s},
@@ -171,6 +186,7 @@ std::string identification_json(const Identification& found, double mass) {
                  {"mass", mass},
                  {"modes", modes},
                  {"residual_db", found.residual_db},
+                 {"choices", choices},
                  {"octaves", octaves},
                  {"warnings", found.warnings}};
   return out.dump(2, ' ', false, json::error_handler_t::replace) + "\n";

@@ -349,6 +349,47 @@ TEST_CASE("A mode limit keeps the strongest modes, none below the floor", "[iden
   }
 }
 
+TEST_CASE("A falling pitch is explained by close modes", "[identify]") {
+  // A drum: a tone of 150 Hz with a T60 of 0.4 s starts 80 cents sharp and settles within 0.1 s.
+  std::vector<double> sound(44100);
+  double turns = 0.0;
+  for (std::size_t n = 0; n < sound.size(); ++n) {
+    const double t = static_cast<double>(n) / 44100.0;
+    turns += 150.0 * std::exp2(80.0 / 1200.0 * std::exp(-t / 0.1)) / 44100.0;
+    sound[n] = std::exp(-std::log(1000.0) / 0.4 * t) * std::sin(2.0 * std::numbers::pi * turns);
+  }
+  Random random(94);
+  const std::vector<std::vector<double>> noisy = {with_noise(sound, 0.003, random)};
+  const Identification found = identified(noisy);
+  CHECK(found.residual_db < -20.0);
+  for (const IdentifiedMode& mode : found.modes) {
+    if (mode.amplitude[0].value > 0.1) {
+      CHECK(mode.frequency_hz.value > 130.0);
+      CHECK(mode.frequency_hz.value < 180.0);
+    }
+  }
+}
+
+TEST_CASE("The residual of fewer modes is reported, and missing modes give a warning",
+          "[identify]") {
+  Random random(95);
+  const std::vector<std::vector<double>> sound = {
+      with_noise(ringing(thirty(96), 1.0), 0.01, random)};
+  const Identification found = identified(sound, 44100.0, {.most_modes = 40, .least_modes = 40});
+  REQUIRE(found.modes.size() == 30);
+  REQUIRE(found.warnings.size() == 1);
+  CHECK(found.warnings[0] == "only 30 modes were found");
+  REQUIRE(found.choices.size() == 3);
+  CHECK(found.choices[0].modes == 5);
+  CHECK(found.choices[2].modes == 20);
+  for (std::size_t i = 0; i + 1 < found.choices.size(); ++i) {
+    CHECK(found.choices[i].residual_db > found.choices[i + 1].residual_db);
+  }
+  const Identification five = identified(sound, 44100.0, {.most_modes = 5});
+  REQUIRE(five.modes.size() == 5);
+  CHECK(five.residual_db == Approx(found.choices[0].residual_db).margin(0.5));
+}
+
 TEST_CASE("Unusable recordings are rejected with the reason", "[identify]") {
   CHECK(refusal({}) == "the recording has no samples");
   CHECK(refusal({{}}) == "the recording has no samples");

@@ -1,0 +1,105 @@
+#include "core/identification/noise_bands.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <complex>
+
+#include "core/linear_algebra/fourier.h"
+
+namespace ressort::identification {
+namespace {
+
+constexpr double edges_hz[] = {20.0, 150.0, 500.0, 1500.0, 5000.0, 20000.0};
+constexpr double step_s = 0.003;
+constexpr double least_share = 1e-6;
+
+// Returns the energy of each frame of the band.
+std::vector<double> frame_energies(const std::vector<double>& samples, std::size_t frame) {
+  std::vector<double> energies;
+  for (std::size_t from = 0; from < samples.size(); from += frame) {
+    double energy = 0.0;
+    for (std::size_t n = from; n < std::min(samples.size(), from + frame); ++n) {
+      energy += samples[n] * samples[n];
+    }
+    energies.push_back(energy);
+  }
+  return energies;
+}
+
+// Returns the samples between two frequencies.
+std::vector<double> part_between(const std::vector<double>& samples, double low_hz, double high_hz,
+                                 double rate_hz) {
+  Fourier fourier(std::bit_ceil(2 * samples.size()));
+  std::vector<double> padded(fourier.size());
+  std::vector<std::complex<double>> bins(fourier.bins());
+  std::copy(samples.begin(), samples.end(), padded.begin());
+  fourier.forward(padded, bins);
+  for (std::size_t k = 0; k < bins.size(); ++k) {
+    const double hertz = static_cast<double>(k) * rate_hz / static_cast<double>(fourier.size());
+    bins[k] = hertz >= low_hz && hertz < high_hz ? bins[k] : 0.0;
+  }
+  fourier.inverse(bins, padded);
+  padded.resize(samples.size());
+  return padded;
+}
+
+}  // namespace
+
+std::vector<NoiseBand> noise_bands(const Identification& found) {
+  const auto frame = std::max<std::size_t>(1, static_cast<std::size_t>(step_s * found.rate_hz));
+  double sound = 0.0;
+  for (const std::vector<double>& channel : found.sound) {
+    for (const double x : channel) {
+      sound += x * x;
+    }
+  }
+  std::vector<NoiseBand> bands;
+  for (std::size_t b = 0; b + 1 < std::size(edges_hz) && edges_hz[b] < 0.45 * found.rate_hz; ++b) {
+    NoiseBand band{.low_hz = edges_hz[b],
+                   .high_hz = std::min(edges_hz[b + 1], 0.5 * found.rate_hz)};
+    std::vector<double> all;
+    std::vector<double> of_channel;
+    for (const std::vector<double>& channel : found.residual) {
+      std::vector<double> energies =
+          frame_energies(part_between(channel, band.low_hz, band.high_hz, found.rate_hz), frame);
+      // The steady noise of the room is that of the end.
+      std::vector<double> tail(
+          energies.begin() + static_cast<std::ptrdiff_t>(energies.size() * 3 / 4), energies.end());
+      const auto middle = tail.begin() + static_cast<std::ptrdiff_t>(tail.size() / 2);
+      std::nth_element(tail.begin(), middle, tail.end());
+      double sum = 0.0;
+      all.resize(energies.size());
+      for (std::size_t i = 0; i < energies.size(); ++i) {
+        const double above = std::max(0.0, energies[i] - *middle);
+        all[i] += above;
+        sum += above;
+      }
+      of_channel.push_back(sum);
+    }
+    const auto loudest =
+        static_cast<std::size_t>(std::max_element(all.begin(), all.end()) - all.begin());
+    double energy = 0.0;
+    double moment = 0.0;
+    double whole = 0.0;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      whole += all[i];
+      energy += i >= loudest ? all[i] : 0.0;
+      moment += i >= loudest ? all[i] * (static_cast<double>(i - loudest) + 0.5) : 0.0;
+    }
+    if (!(whole > least_share * sound) || !(energy > 0.0)) {
+      continue;
+    }
+    // The energy of an exponential decay is centred at 1 / (2 alpha).
+    const double centre_s = moment / energy * static_cast<double>(frame) / found.rate_hz;
+    band.rise_s = static_cast<double>(loudest * frame) / found.rate_hz;
+    band.t60_s = std::log(1000.0) * 2.0 * centre_s;
+    for (const double sum : of_channel) {
+      band.level.push_back(std::sqrt(sum / (centre_s * found.rate_hz)));
+    }
+    bands.push_back(std::move(band));
+  }
+  return bands;
+}
+
+}  // namespace ressort::identification

@@ -1,0 +1,23 @@
+// core/identification: describes what does not ring in a recording by bands of decaying noise.
+#pragma once
+
+#include <vector>
+
+#include "core/identification/identify.h"
+
+namespace ressort::identification {
+
+// Noise in one band that rises for a moment and then decays exponentially.
+struct NoiseBand {
+  double low_hz = 0.0;
+  double high_hz = 0.0;
+  double rise_s = 0.0;        // Time from the start of the sound to the loudest moment.
+  double t60_s = 0.0;         // Decay after that.
+  std::vector<double> level;  // [channel] Rms at the start of the decay.
+};
+
+// Describes the residual of an identification. A band has the energy of the residual there. Bands
+// that hold less than a millionth of the sound are left out. [any thread but audio]
+std::vector<NoiseBand> noise_bands(const Identification& found);
+
+}  // namespace ressort::identification

@@ -1,0 +1,38 @@
+// Noise whose level and decay are known, beside a mode.
+#include "core/identification/noise_bands.h"
+
+#include "tests/support/ringing.h"
+
+namespace ressort::noise_bands_test {
+
+using namespace support;
+
+TEST_CASE("Bands have the level and the decay of the noise", "[noise_bands]") {
+  // White noise of rms 0.1 that decays with a T60 of 0.2 s. A band of width B holds a share of
+  // B / 22050 of its power: 3500 Hz are -8.0 dB.
+  Random random(3);
+  const double alpha = std::log(1000.0) / 0.2;
+  std::vector<double> noise = with_noise(std::vector<double>(44100), 0.1, random);
+  for (std::size_t n = 0; n < noise.size(); ++n) {
+    noise[n] *= std::exp(-alpha * static_cast<double>(n) / 44100.0);
+  }
+  const Identification found{.rate_hz = 44100.0, .sound = {noise}, .residual = {noise}};
+  const std::vector<NoiseBand> bands = noise_bands(found);
+  REQUIRE(bands.size() == 5);
+  const NoiseBand& band = bands[3];
+  CHECK(band.low_hz == 1500.0);
+  CHECK(band.high_hz == 5000.0);
+  // 3500 Hz for 30 ms are about 200 independent values: 10 % deviation of each figure.
+  CHECK(band.t60_s == Approx(0.2).epsilon(0.3));
+  CHECK(band.level[0] == Approx(0.1 * std::sqrt(3500.0 / 22050.0)).epsilon(0.3));
+  CHECK(band.rise_s < 0.015);
+}
+
+TEST_CASE("Bands without noise are left out", "[noise_bands]") {
+  const std::vector<double> sound = ringing({{300.0, 1.0, 1.0, 0.0}}, 1.0);
+  const Identification found{
+      .rate_hz = 44100.0, .sound = {sound}, .residual = {std::vector<double>(sound.size())}};
+  CHECK(noise_bands(found).empty());
+}
+
+}  // namespace ressort::noise_bands_test
