@@ -97,7 +97,8 @@ void add_budget(CLI::App& command, std::optional<Budget>& budget) {
 }
 
 void add_strict(CLI::App& command, bool& is_strict) {
-  command.add_flag("--strict", is_strict, "fail (exit code 2) if the budget may be missed, or if a MIDI file is damaged");
+  command.add_flag("--strict", is_strict,
+                   "fail (exit code 2) if the budget may be missed, or if a MIDI file is damaged");
 }
 
 void add_no_rescale(CLI::App& command, bool& rescale) {
@@ -122,6 +123,20 @@ void add_keys(CLI::App& command, KeyOptions& keys) {
           "--a4", [&keys](const double& hz) { keys.a4_hz = hz; }, "pitch of A4 (default 440)")
       ->type_name("HZ")
       ->check(within(220.0, 880.0));
+  command
+      .add_option_function<std::vector<int>>(
+          "--channel",
+          [&keys](const std::vector<int>& channels) {
+            unsigned mask = 0;
+            for (const int channel : channels) {
+              mask |= 1U << (channel - 1);
+            }
+            keys.channels = mask;
+          },
+          "MIDI channels to receive (default: the preset's)")
+      ->type_name("N,...")
+      ->delimiter(',')
+      ->check(within(1, 16));
   command.add_option("--transpose", keys.transpose, "semitones added to every preset's keys")
       ->type_name("SEMITONES")
       ->check(within(-most_transpose, most_transpose));

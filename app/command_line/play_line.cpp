@@ -88,20 +88,6 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
           "play every OF-th note only; start one program for each N")
       ->type_name("N/OF");
   add_keys(*command, options.keys);
-  command
-      ->add_option_function<std::vector<int>>(
-          "--channel",
-          [&options](const std::vector<int>& channels) {
-            unsigned mask = 0;
-            for (const int channel : channels) {
-              mask |= 1U << (channel - 1);
-            }
-            options.keys.channels = mask;
-          },
-          "MIDI channels to receive (default: the preset's)")
-      ->type_name("N,...")
-      ->delimiter(',')
-      ->check(within(1, 16));
   command->add_option("-r,--rate", options.device.rate_hz, "sample rate, unless JACK sets it")
       ->type_name("HZ")
       ->check(within(8000.0, 384000.0))

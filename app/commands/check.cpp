@@ -17,6 +17,7 @@
 #include "app/text.h"
 #include "core/analysis/stability.h"
 #include "core/compile/compile.h"
+#include "core/compile/schemes.h"
 #include "core/model/language/print.h"
 #include "core/model/topology.h"
 
@@ -316,6 +317,11 @@ void print_report(const Scene& scene, const Compiled& compiled, const Proved& pr
                 instrument.mode->frequency_hz, instrument.highest_frequency_hz);
   }
   std::printf("%s\n", conclusion(scene, proved).c_str());
+  const auto hazard =
+      choose_schemes(expand_macros(scene.network), {.passive = Passivity::never}).hazard;
+  if (!scene.has_preset && hazard) {
+    std::printf("render without notes: %s\n", hazard->message.c_str());
+  }
 }
 
 }  // namespace

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <set>
 
 #include "app/commands/smf/midi_file.h"
@@ -44,20 +46,50 @@ Error at(const std::string& path, const Error& error) {
   return {to_string(finding_of(path, "", error))};
 }
 
-// Returns the lines of the score, or of the default phrase. Errors have the line of the score.
-Result<std::vector<ScoreLine>> read_score(const RenderOptions& options, bool is_bare) {
-  if (options.score.empty()) {
-    return parse_score(!options.phrase.empty() ? options.phrase
-                       : is_bare || !options.input.empty() || !options.midi.empty()
-                           ? ""
-                           : to_score(default_phrase()));
+// Reads a score, which may come through a pipe.
+Result<std::string> read_score_text(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_fifo(path, error) && !std::filesystem::is_character_file(path, error)) {
+    return read_text(path, max_score_bytes);
   }
-  auto text = read_text(options.score, max_score_bytes);
+  std::ifstream pipe(path, std::ios::binary);
+  std::string text(max_score_bytes + 1, '\0');
+  pipe.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(pipe.gcount()));
+  return text.size() > max_score_bytes ? Result<std::string>(Error{"'" + path + "' is too long"})
+                                       : std::move(text);
+}
+
+// Returns the lines of the given score, if any. Errors have the line of the score.
+Result<std::vector<ScoreLine>> read_score(const RenderOptions& options) {
+  if (options.score.empty()) {
+    return parse_score(options.phrase);
+  }
+  auto text = read_score_text(options.score);
   if (!text) {
     return text.error();
   }
   auto lines = parse_score(*text);
   return lines ? std::move(lines) : at(options.score, lines.error());
+}
+
+bool plays_notes(const std::vector<ScoreLine>& lines) {
+  return std::any_of(lines.begin(), lines.end(), [](const ScoreLine& line) {
+    return line.message.address.starts_with("/note");
+  });
+}
+
+// Returns a warning about options for keys that have no effect, or an empty string.
+std::string unused_keys(const RenderOptions& options, bool is_bare) {
+  const KeyOptions& keys = options.keys;
+  const bool has_tuning =
+      !keys.scale.empty() || !keys.keyboard_map.empty() || keys.a4_hz || keys.transpose != 0;
+  if (keys.channels && options.midi.empty()) {
+    return "--channel has no effect without --midi";
+  }
+  return is_bare && has_tuning ? "the tuning has no effect, because no key is played; pass --midi, "
+                                 "or a --score with notes"
+                               : "";
 }
 
 // Returns the parameters that the score sets.
@@ -250,9 +282,15 @@ std::string to_score(const std::vector<PhraseNote>& notes) {
 
 Result<Rendered> render(const RenderOptions& options, const std::function<bool(double)>& progress) {
   // Notes need a preset: a bare model gets its default preset.
+  auto lines = read_score(options);
+  if (!lines) {
+    return lines.error();
+  }
+  // Notes tune a model without a preset, from a score as from a MIDI file.
+  const bool has_keys = !options.midi.empty() || plays_notes(*lines);
   auto scene = load_scene(
       options.name,
-      {.bare = options.midi.empty(),
+      {.bare = !has_keys,
        .third = options.third,
        .keys = options.keys,
        .most_nodes = std::clamp(free_memory_bytes() / bytes_of_node, max_macro_nodes, most_nodes),
@@ -268,10 +306,13 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
   if (auto spared = check_not_input(options.output, read); !spared) {
     return spared.error();
   }
-  const bool is_bare = !scene->has_preset && options.midi.empty();
-  const auto lines = read_score(options, is_bare);
-  if (!lines) {
-    return lines.error();
+  const bool is_bare = !scene->has_preset && !has_keys;
+  if (!is_bare && options.score.empty() && options.phrase.empty() && options.input.empty() &&
+      options.midi.empty()) {
+    lines = parse_score(to_score(default_phrase()));
+  }
+  if (const std::string unused = unused_keys(options, is_bare); !unused.empty()) {
+    scene->warnings.push_back(unused);
   }
   auto midi = options.midi.empty() ? Result<MidiFile>(MidiFile()) : read_midi_file(options.midi);
   if (!midi) {

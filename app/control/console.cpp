@@ -310,7 +310,7 @@ std::vector<std::string> Console::completions(std::string_view line) const {
     add(kind == "MODEL" ? known_models() : std::vector<std::string>{});
     add(files(typed, scene_endings));
   } else if (kind.find("TUNING") != kind.npos) {
-    constexpr std::string_view tuning_endings[] = {".scl", ".kbm"};
+    constexpr std::string_view tuning_endings[] = {".scl", ".ascl", ".kbm"};
     if (before.size() == 1) {
       words.emplace_back("off");
     }

@@ -442,7 +442,8 @@ Result<Done> command::tuning(ConsoleContext& console, Words words) {
     std::string map;
     for (const std::string& word : words) {
       std::string& path = word.ends_with(".kbm") ? map : scale;
-      if (!path.empty() || !(word.ends_with(".scl") || word.ends_with(".kbm"))) {
+      if (!path.empty() ||
+          !(word.ends_with(".scl") || word.ends_with(".ascl") || word.ends_with(".kbm"))) {
         return Error{"expected a scale, NAME.scl, a keyboard map, NAME.kbm, or off; found '" +
                      word + "'"};
       }

@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <set>
 #include <system_error>
 
@@ -116,6 +117,36 @@ std::string known_scene(const std::string& name) {
   return "";
 }
 
+// Returns an error if a name leads to something that is no file: a folder, a pipe, or a link to
+// itself or to nothing.
+std::optional<Error> odd_file(const std::string& name) {
+  std::vector<fs::path> paths = {fs::path(name), fs::path(name + ".toml"), fs::path(name + ".mdl")};
+  for (const fs::path& folder : known_folders()) {
+    for (const char* const ending : {"", ".toml"}) {
+      paths.push_back(folder / "presets" / (name + ending));
+    }
+    for (const char* const ending : {"", ".mdl"}) {
+      paths.push_back(folder / "models" / (name + ending));
+    }
+  }
+  for (const fs::path& path : paths) {
+    std::error_code error;
+    const bool is_link = fs::is_symlink(fs::symlink_status(path, error));
+    const fs::file_status status = fs::status(path, error);
+    if (fs::is_regular_file(status) || (!fs::exists(status) && !is_link)) {
+      continue;
+    }
+    return Error{"'" + path.string() + "' is " +
+                 (error == std::errc::too_many_symbolic_link_levels ? "a loop of links"
+                  : !fs::exists(status)                             ? "a link to nothing"
+                  : fs::is_directory(status)                        ? "a folder"
+                  : fs::is_fifo(status)                             ? "a pipe"
+                                                                    : "not a regular file") +
+                 "; expected a .mdl model or a .toml preset"};
+  }
+  return std::nullopt;
+}
+
 std::string meant_by(const std::string& name) {
   std::vector<std::string> known = known_presets();
   const std::vector<std::string> models = known_models();
@@ -214,15 +245,15 @@ Result<std::string> find_scene(const std::string& name, Reach reach) {
                  (presets.empty() ? "none" : presets) + meant_by(name)};
   }
   for (const fs::path& path : {fs::path(name), fs::path(name + ".toml"), fs::path(name + ".mdl")}) {
-    if (fs::exists(path, error) && !fs::is_directory(path, error)) {
+    if (fs::is_regular_file(path, error)) {
       return path.string();
     }
   }
   if (std::string path = known_scene(name); !path.empty()) {
     return path;
   }
-  if (fs::is_directory(name, error)) {
-    return Error{"'" + name + "' is a folder; expected a .mdl model or a .toml preset"};
+  if (const auto odd = odd_file(name)) {
+    return *odd;
   }
   return Error{"there is no model or preset '" + name + "'; there are " +
                (presets.empty() ? "none in '" + data_folder().string() + "'" : presets) +
@@ -232,7 +263,7 @@ Result<std::string> find_scene(const std::string& name, Reach reach) {
 std::optional<std::string> own_file(const std::string& path) {
   std::error_code error;
   const fs::path found = fs::canonical(path, error);
-  const fs::path endings[] = {".mdl", ".toml", ".scl", ".kbm"};
+  const fs::path endings[] = {".mdl", ".toml", ".scl", ".ascl", ".kbm"};
   if (error || !fs::is_regular_file(found, error) ||
       std::find(std::begin(endings), std::end(endings), found.extension()) == std::end(endings)) {
     return std::nullopt;

@@ -131,9 +131,9 @@ TuningReading tuning_of(const std::string& scale_path, const std::string& map_pa
   for (int step = 1; step <= 12; ++step) {
     scale.cents.push_back(100.0 * step);
   }
-  KeyboardMap map;
+  std::optional<KeyboardMap> map;
   if (read(scale_path, parse_scale, scale) && read(map_path, parse_keyboard_map, map)) {
-    auto keys = key_frequencies(scale, map);
+    auto keys = key_frequencies(scale, map ? *map : usual_map(scale));
     if (keys) {
       out.keys_hz = *std::move(keys);
     } else {

@@ -8,10 +8,11 @@
 
 namespace ressort::session {
 
-void ProblemReports::add_reset(const std::string& model) {
-  resets_.add(model +
-              ": a voice became unstable and was faded out; lower its stiffness or "
-              "damping, or raise its mass");
+void ProblemReports::add_reset(const std::string& model, bool is_proved) {
+  resets_.add(model + (is_proved ? ": a voice was faded out, because it was pushed too hard; lower "
+                                   "the force"
+                                 : ": a voice became unstable and was faded out; lower its "
+                                   "stiffness or damping, or raise its mass"));
 }
 
 void ProblemReports::add_overload(const Report& report) {

@@ -16,8 +16,8 @@ class ProblemReports {
  public:
   explicit ProblemReports(Precision precision) : precision_(precision) {}
 
-  // A voice of this model became unstable.
-  void add_reset(const std::string& model);
+  // A voice of this model became unstable. A model that is proved stable was pushed too hard.
+  void add_reset(const std::string& model, bool is_proved);
   // The load is too high.
   void add_overload(const Report& report);
   // Adds late and dropped events since the last call.

@@ -151,7 +151,8 @@ void Worker::read_reports() {
       const TimedEvent event = parameter_event(*loaded, report.index, report.value);
       current_.remember({&event, 1});
     } else if (report.kind == Report::Kind::reset) {
-      problems_.add_reset(is_current ? loaded->name : "the last model");
+      problems_.add_reset(is_current ? loaded->name : "the last model",
+                          is_current && loaded->instrument.verdict == Verdict::stable);
     } else if (report.kind == Report::Kind::overload && is_current) {
       problems_.add_overload(report);
     } else if (report.kind == Report::Kind::program) {

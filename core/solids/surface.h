@@ -1,4 +1,4 @@
-// core/solids: reads the surface of a solid from STL or OBJ and checks that it is closed. Pure.
+// core/solids: reads the surface of a solid from a file and checks that it is closed. Pure.
 #pragma once
 
 #include <array>
@@ -42,6 +42,7 @@ using Triangle = std::array<int, 3>;  // Point indices, counter-clockwise seen f
 struct Surface {
   std::vector<Point3> points;  // m
   std::vector<Triangle> triangles;
+  std::size_t ignored_bytes = 0;  // behind the triangles of a binary STL
 };
 
 inline constexpr std::size_t max_triangles = 2'000'000;  // Files with more triangles are rejected.
@@ -52,6 +53,15 @@ inline constexpr double largest_coordinate = 1e9;        // Unit of the file.
 // and what was expected there. O(bytes)
 Result<Surface> read_stl(std::string_view bytes);
 Result<Surface> read_obj(std::string_view text);
+Result<Surface> read_ply(std::string_view bytes);  // text or binary
+Result<Surface> read_off(std::string_view text);
+
+// Returns the format of a file by its content.
+enum class SurfaceFormat { unknown, stl, obj, ply, off };
+SurfaceFormat surface_format(std::string_view bytes);
+
+// Reads a file in any of these formats. Ignores a byte-order mark.
+Result<Surface> read_surface(std::string_view bytes);
 
 // A surface whose shells are all closed.
 struct ClosedSurface {

@@ -1,11 +1,39 @@
 #include "app/commands/body/body.h"
 
 #include <cstdio>
+#include <string_view>
+#include <utility>
 
+#include "app/commands/body/resonances.h"
 #include "app/commands/output.h"
 #include "app/exit_code.h"
+#include "app/session/files.h"
+#include "core/solids/surface.h"
 
 namespace ressort::commands {
+namespace {
+
+// Returns the kind of a file that cannot be read, by its first bytes, or an empty string.
+std::string_view likely_kind(std::string_view bytes) {
+  constexpr std::pair<std::string_view, std::string_view> kinds[] = {
+      {"glTF", "glTF, a 3D scene"},
+      {"PK\x03\x04", "a ZIP archive, such as 3MF"},
+      {"ISO-10303", "a STEP drawing"},
+      {"#VRML", "a VRML scene"},
+      {"<?xml", "XML"},
+      {"MThd", "a MIDI file"},
+      {"\x89PNG", "a picture"},
+      {"%PDF", "a PDF document"},
+      {"  0\nSECTION", "a DXF drawing"}};
+  for (const auto& [start, kind] : kinds) {
+    if (bytes.starts_with(start)) {
+      return kind;
+    }
+  }
+  return "";
+}
+
+}  // namespace
 
 int body_command(const BodyRequest& request) {
   if (request.input.empty()) {
@@ -35,7 +63,11 @@ int body_command(const BodyRequest& request) {
     options.modes = static_cast<std::size_t>(request.modes.value_or(0));
     return network_body(options);
   }
-  if (is_solid_file_name(request.input)) {
+  const auto bytes = read_bytes(request.input, max_solid_bytes);
+  if (!bytes) {
+    return reject(bytes.error().message);
+  }
+  if (solids::surface_format(*bytes) != solids::SurfaceFormat::unknown) {
     if (request.loss.size() > 1) {
       return reject("--loss: a solid has one loss factor; give one number");
     }
@@ -46,6 +78,14 @@ int body_command(const BodyRequest& request) {
     options.picture = request.picture;
     options.modes = request.modes.value_or(options.modes);
     return solid_body(options);
+  }
+  if (const auto resonances = parse_resonances(*bytes)) {
+    return resonance_body(*resonances, common(request.recording), request.mass);
+  }
+  if (const std::string_view other = likely_kind(*bytes); !other.empty()) {
+    return reject("'" + request.input + "' looks like " + std::string(other) +
+                  "; bodies are made of sound files, of solids in STL, OBJ, PLY or OFF, of "
+                  "resonance models (frequency, amplitude, bandwidth) and of .mdl models");
   }
   BodyOptions options = common(request.recording);
   options.picture = request.picture;

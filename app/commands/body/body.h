@@ -48,7 +48,7 @@ struct BodyRequest {
   std::vector<CurvePoint> loss;  // loss factor; empty: that of the material
 };
 
-// Selects the kind of body by the file's extension. [main]
+// Selects the kind of body by the file's content; models by their extension. [main]
 int body_command(const BodyRequest& request);
 
 // Convert a recording and a model. [main]

@@ -21,7 +21,6 @@
 namespace ressort::commands {
 namespace {
 
-constexpr std::size_t max_solid_bytes = std::size_t{256} << 20;
 // Units of the model: 44100 steps per second, micrometres and newtons. A strike by hand then moves
 // a body by about 1, and a kilogram is an M of 1944.81.
 constexpr double m_per_kg = 44100.0 * 44100.0 * 1e-6;
@@ -119,8 +118,7 @@ Result<ClosedSurface> read_solid(const SolidBodyOptions& options, const Progress
     return bytes.error();
   }
   progress.stage("reading the solid");
-  const bool is_obj = lower(options.input).ends_with(".obj");
-  const auto surface = is_obj ? read_obj(*bytes) : read_stl(*bytes);
+  const auto surface = read_surface(*bytes);
   const auto located = [&](const Error& error) {
     return Error{options.input +
                  (error.line > 0 ? ":" + std::to_string(error.line) : std::string()) +
@@ -128,6 +126,10 @@ Result<ClosedSurface> read_solid(const SolidBodyOptions& options, const Progress
   };
   if (!surface) {
     return located(surface.error());
+  }
+  if (surface->ignored_bytes > 0) {
+    print_error("warning: " + options.input + ": ignored " +
+                counted(surface->ignored_bytes, "byte", "bytes") + " behind the last triangle");
   }
   auto closed = close_surface(scaled(*surface, options.scale), progress);
   if (!closed) {
@@ -228,11 +230,6 @@ std::string header_comment(const SolidBodyOptions& options, const MaterialChoice
 }
 
 }  // namespace
-
-bool is_solid_file_name(const std::string& file) {
-  const std::string name = lower(file);
-  return name.ends_with(".stl") || name.ends_with(".obj");
-}
 
 Result<PickedPlace> parse_place(const std::string& text) {
   const std::size_t equals = text.find('=');

@@ -11,6 +11,8 @@
 
 namespace ressort::commands {
 
+inline constexpr std::size_t max_solid_bytes = std::size_t{256} << 20;
+
 // A place on the surface, in the unit of the file.
 struct PickedPlace {
   std::string name;
@@ -36,9 +38,6 @@ struct SolidBodyOptions {
   MeshOrder mesh;
   std::string picture;  // .svg of the lowest mode shapes; empty: none
 };
-
-// Returns whether a file name ends in .stl or .obj.
-bool is_solid_file_name(const std::string& file);
 
 // Reads and meshes the solid, computes its modes and writes them as a model. Prints progress to
 // stderr and a summary to stdout. Returns the exit code. [main]

@@ -137,7 +137,7 @@ class Track {
     } else if (status == 0xf0 || status == 0xf7) {
       const std::uint32_t count = reader_.quantity("the length of a SysEx");
       const Bytes data = reader_.take(count, "a SysEx");
-      if (status == 0xf0 || !data.empty()) {
+      if (!reader_.failure() && (status == 0xf0 || !data.empty())) {
         add_message(status == 0xf0 ? 0xf0 : 0, data);
       }
     } else if (status == 0xff) {
@@ -177,6 +177,7 @@ class Track {
                                            : 0;
       if (quarter_us == 0) {
         reader_.fail(start, "a tempo must have three bytes and must not be 0");
+        return true;
       }
       add(TrackEvent::Kind::tempo, 0, quarter_us);
     }
@@ -245,7 +246,7 @@ class Tracks {
       std::tie(at, is_ended) = read_events(first, next);
       end = next;
       warn(first - 4, "the chunk says " + std::to_string(count) + " bytes, but its events go on");
-    } else if (count > rest || (is_ended && at < end && is_chunk_at(at))) {
+    } else if ((count > rest && !failure_) || (is_ended && at < end && is_chunk_at(at))) {
       warn(first - 4, "the chunk says " + std::to_string(count) +
                           " bytes, but its events end after " + std::to_string(at - first));
       end = at;

@@ -756,7 +756,8 @@ void read_keys(const toml::table& root, TomlTable& reader, Preset& preset) {
     }
     location = location_of(*root.get(key));
     constexpr std::size_t longest_name = 255;
-    if (name.size() > longest_name || name.find('/') != name.npos || !name.ends_with(ending)) {
+    if (name.size() > longest_name || name.find('/') != name.npos ||
+        !(name.ends_with(ending) || (ending == ".scl" && name.ends_with(".ascl")))) {
       reader.fail(location, "'" + std::string(key) + "' must be the name of a " +
                                 std::string(ending) + " file beside the preset");
       name.clear();

@@ -1,6 +1,7 @@
 #include "core/model/tuning/scala.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <string>
@@ -16,8 +17,9 @@ class ScalaLines {
  public:
   explicit ScalaLines(std::string_view text) : rest_(text) {}
 
-  // Advances to the next line; returns false at the end.
-  bool next() {
+  // Advances to the next line; returns false at the end. Comments go to `remark`.
+  template <class Remark>
+  bool next(Remark&& remark) {
     while (!rest_.empty()) {
       const std::size_t end = std::min(rest_.find('\n'), rest_.size());
       line_ = rest_.substr(0, end);
@@ -29,17 +31,21 @@ class ScalaLines {
       if (!line_.starts_with('!')) {
         return true;
       }
+      remark(line_.substr(1));
     }
     line_ = {};
     ++number_;
     return false;
   }
+  bool next() {
+    return next([](std::string_view) {});
+  }
 
-  // Returns the first word; the rest of a line is a comment.
+  // Returns the first word; the rest of a line, or of a word after '!', is a comment.
   std::string_view word() const {
     const std::size_t start = std::min(line_.find_first_not_of(blanks), line_.size());
     const std::string_view rest = line_.substr(start);
-    return rest.substr(0, std::min(rest.find_first_of(blanks), rest.size()));
+    return rest.substr(0, std::min(rest.find_first_of(" \t\v\f!"), rest.size()));
   }
   int number() const { return number_; }
 
@@ -76,13 +82,41 @@ std::optional<double> cents_of(std::string_view word) {
     return cents && std::fabs(*cents) <= most_cents ? cents : std::nullopt;
   }
   const std::size_t slash = word.find('/');
-  const auto above = number_of<long long>(word.substr(0, slash));
-  const auto below =
-      slash == word.npos ? std::optional(1LL) : number_of<long long>(word.substr(slash + 1));
-  if (!above || !below || *above <= 0 || *below <= 0) {
+  const auto whole = [](std::string_view digits) {  // of any length
+    const bool is_whole = digits.find_first_not_of("0123456789") == digits.npos;
+    return is_whole ? number_of<double>(digits).value_or(0.0) : 0.0;
+  };
+  const double above = whole(word.substr(0, slash));
+  const double below = slash == word.npos ? 1.0 : whole(word.substr(slash + 1));
+  return above > 0.0 && below > 0.0 ? std::optional(1200.0 * std::log2(above / below))
+                                    : std::nullopt;
+}
+
+// Reads an extension of .ascl files: "@ABL REFERENCE_PITCH octave step hz". Octave 4 starts at
+// middle C.
+std::optional<ReferencePitch> reference_of(std::string_view comment) {
+  std::array<double, 3> numbers{};
+  constexpr std::string_view name = "@ABL REFERENCE_PITCH ";
+  const std::size_t start = comment.find(name);
+  if (start == comment.npos || comment.find_first_not_of(blanks) != start) {
     return std::nullopt;
   }
-  return 1200.0 * std::log2(static_cast<double>(*above) / static_cast<double>(*below));
+  std::string_view rest = comment.substr(start + name.size());
+  for (double& number : numbers) {
+    rest.remove_prefix(std::min(rest.find_first_not_of(blanks), rest.size()));
+    const std::size_t length = std::min(rest.find_first_of(blanks), rest.size());
+    const auto read = number_of<double>(rest.substr(0, length));
+    if (!read) {
+      return std::nullopt;
+    }
+    number = *read;
+    rest.remove_prefix(length);
+  }
+  const auto [octave, step, hz] = numbers;
+  constexpr double most = 1024.0;
+  return std::fabs(octave) <= 20.0 && std::fabs(step) <= most && hz >= 1.0 && hz <= 20'000.0
+             ? std::optional(ReferencePitch{static_cast<int>(octave), static_cast<int>(step), hz})
+             : std::nullopt;
 }
 
 }  // namespace
@@ -97,8 +131,8 @@ Result<Scale> parse_scale(std::string_view text) {
   }
   lines.next();
   const auto count = number_of<int>(lines.word());
-  if (!count || *count < 1 || *count > max_scale_notes) {
-    return lines.expected("how many notes the scale has, 1 to " + std::to_string(max_scale_notes));
+  if (!count || *count < 0 || *count > max_scale_notes) {
+    return lines.expected("how many notes the scale has, 0 to " + std::to_string(max_scale_notes));
   }
   Scale scale;
   for (int note = 1; note <= *count; ++note) {
@@ -110,10 +144,25 @@ Result<Scale> parse_scale(std::string_view text) {
     }
     scale.cents.push_back(*cents);
   }
-  if (scale.cents.back() <= 0.0) {
-    return lines.expected("a last note above the first, at which the scale repeats");
+  if (scale.cents.empty()) {
+    scale.cents.push_back(0.0);  // 1/1 only: all keys sound alike
   }
+  lines.next([&](std::string_view comment) {
+    const auto reference = reference_of(comment);
+    scale.reference = reference ? reference : scale.reference;
+  });
   return scale;
+}
+
+KeyboardMap usual_map(const Scale& scale) {
+  KeyboardMap map;
+  if (scale.reference) {
+    const auto notes = static_cast<int>(scale.cents.size());
+    map.reference_key =
+        map.middle_key + (scale.reference->octave - 4) * notes + scale.reference->step;
+    map.reference_hz = scale.reference->hz;
+  }
+  return map;
 }
 
 Result<KeyboardMap> parse_keyboard_map(std::string_view text) {
@@ -191,17 +240,30 @@ Result<std::vector<double>> key_frequencies(const Scale& scale, const KeyboardMa
     const int octave = map.octave_steps == 0 ? notes : map.octave_steps;
     return step ? std::optional(cents_of_step(*step) + turn * cents_of_step(octave)) : std::nullopt;
   };
-  const auto reference = cents_of_key(map.reference_key);
-  if (!reference) {
-    return Error{"the keyboard map sets the pitch at key " + std::to_string(map.reference_key) +
-                 ", which it makes silent"};
+  // A reference key without a step lies between the two keys around it that have one.
+  const auto mapped_from = [&](int key, int way) {
+    const auto size = std::max<std::size_t>(map.steps.size(), 1);
+    for (std::size_t i = 0; i < size && !cents_of_key(key); ++i) {
+      key += way;
+    }
+    return key;
+  };
+  const int below = mapped_from(map.reference_key, -1);
+  const int above = mapped_from(map.reference_key, 1);
+  const auto low = cents_of_key(below);
+  const auto high = cents_of_key(above);
+  if (!low || !high) {
+    return Error{"the keyboard map makes all keys silent"};
   }
+  const double reference =
+      *low +
+      (above == below ? 0.0 : (*high - *low) * (map.reference_key - below) / (above - below));
   std::vector<double> frequencies;
   for (int key = 0; key < 128; ++key) {
     const auto cents = cents_of_key(key);
     const bool is_mapped = key >= map.first_key && key <= map.last_key;
     const double hz = !is_mapped ? 440.0 * std::exp2((key - 69) / 12.0)
-                      : cents    ? map.reference_hz * std::exp2((*cents - *reference) / 1200.0)
+                      : cents    ? map.reference_hz * std::exp2((*cents - reference) / 1200.0)
                                  : 0.0;
     constexpr double lowest_hz = 1e-3;
     constexpr double highest_hz = 1e6;

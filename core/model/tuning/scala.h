@@ -15,10 +15,18 @@ inline constexpr std::size_t max_tuning_bytes = std::size_t{64} << 10;
 inline constexpr int max_scale_notes = 1024;
 inline constexpr int max_mapped_keys = 1024;
 
+// The pitch of a step of a scale. Octave 4 is the one at middle C, key 60.
+struct ReferencePitch {
+  int octave = 4;
+  int step = 0;
+  double hz = 0.0;
+};
+
 // One period of a scale.
 struct Scale {
   // cents of every step but the first, which is 0; the last is the period
   std::vector<double> cents;
+  std::optional<ReferencePitch> reference;  // of an .ascl file; for use without a keyboard map
 };
 
 // The steps of the keys. Keys outside first_key..last_key are tuned as without a scale.
@@ -33,13 +41,17 @@ struct KeyboardMap {
       steps;  // nothing: silent key; empty: each key plays the next step
 };
 
+// Returns the map without a file: each key plays the next step, and middle C, or the reference of
+// the scale, sets the pitch. [any thread]
+KeyboardMap usual_map(const Scale& scale);
+
 // Errors have a line and a column. [any thread but audio]
 Result<Scale> parse_scale(std::string_view text);
 Result<KeyboardMap> parse_keyboard_map(std::string_view text);
 
 // Returns the frequency in Hz of every MIDI key 0..127; 0 for a silent key. Keys outside the map
 // are in equal temperament at A = 440 Hz. Keys above 1 MHz or below 1 mHz are silent. Fails if the
-// reference key is silent. [any thread but audio]
+// map makes all keys silent. [any thread but audio]
 Result<std::vector<double>> key_frequencies(const Scale& scale, const KeyboardMap& map);
 
 }  // namespace ressort::model

@@ -148,6 +148,22 @@ TEST_CASE("a failed write keeps the old file", "[files]") {
   CHECK(fs::is_character_file("/dev/null"));
 }
 
+TEST_CASE("the error for a name says what is there instead of a file", "[files]") {
+  const Folder folder;
+  const auto said = [&](const std::string& name) {
+    return error_of(find_scene(folder.file(name), Reach::any_file));
+  };
+  REQUIRE(mkfifo(folder.file("Pipe.toml").c_str(), 0600) == 0);
+  fs::create_directory(folder.file("Folder"));
+  fs::create_symlink(folder.file("Loop.mdl"), folder.file("Loop.mdl"));
+  fs::create_symlink(folder.file("nowhere"), folder.file("Lost.mdl"));
+  CHECK(has(said("Pipe"), "Pipe.toml' is a pipe; expected a .mdl model"));
+  CHECK(has(said("Folder"), "Folder' is a folder; expected"));
+  CHECK(has(said("Loop"), "Loop.mdl' is a loop of links; expected"));
+  CHECK(has(said("Lost"), "Lost.mdl' is a link to nothing; expected"));
+  CHECK(has(said("None"), "there is no model or preset"));
+}
+
 TEST_CASE("a byte order mark is skipped, and UTF-16 is an error", "[files]") {
   const Folder folder;
   const auto text = read_text(folder.write("a",

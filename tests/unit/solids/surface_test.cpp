@@ -33,6 +33,133 @@ TEST_CASE("a solid is the same from ASCII, binary and OBJ", "[surface]") {
   }
 }
 
+namespace {
+
+// A cuboid of 200, 20 and 10 in each format.
+constexpr double corners[8][3] = {{0, 0, 0},  {200, 0, 0},  {200, 20, 0},  {0, 20, 0},
+                                  {0, 0, 10}, {200, 0, 10}, {200, 20, 10}, {0, 20, 10}};
+constexpr int sides[6][4] = {{3, 2, 1, 0}, {4, 5, 6, 7}, {0, 1, 5, 4},
+                             {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}};
+
+template <class Number>
+void append_raw(std::string& bytes, Number number, bool is_big) {
+  char raw[sizeof(Number)];
+  std::memcpy(raw, &number, sizeof raw);
+  if (is_big) {
+    std::reverse(std::begin(raw), std::end(raw));
+  }
+  bytes.append(raw, sizeof raw);
+}
+
+std::string ply(const std::string& format) {
+  std::string text = "ply\nformat " + format +
+                     " 1.0\ncomment made here\nelement vertex 8\nproperty float x\n"
+                     "property float y\nproperty double z\nproperty uchar red\nelement face 6\n"
+                     "property list uchar int vertex_indices\nelement edge 1\nproperty int one\n"
+                     "end_header\n";
+  const bool is_text = format == "ascii";
+  const bool is_big = format == "binary_big_endian";
+  for (const auto& p : corners) {
+    if (is_text) {
+      text +=
+          std::to_string(p[0]) + " " + std::to_string(p[1]) + "\n" + std::to_string(p[2]) + " 9\n";
+      continue;
+    }
+    append_raw(text, static_cast<float>(p[0]), is_big);
+    append_raw(text, static_cast<float>(p[1]), is_big);
+    append_raw(text, p[2], is_big);
+    text += '\x09';
+  }
+  for (const auto& side : sides) {
+    text += is_text ? "4" : "\x04";
+    for (const int point : side) {
+      if (is_text) {
+        text += " " + std::to_string(point);
+      } else {
+        append_raw(text, point, is_big);
+      }
+    }
+    text += is_text ? "\n" : "";
+  }
+  return text + (is_text ? "1\n" : std::string("\0\0\0\1", 4));
+}
+
+}  // namespace
+
+TEST_CASE("a solid's format is that of its content", "[surface]") {
+  std::string off = "OFF # a comment\n8 6 0\n";
+  std::string continued = "# made here\n";
+  for (const auto& p : corners) {
+    const std::string numbers =
+        std::to_string(p[0]) + " " + std::to_string(p[1]) + " " + std::to_string(p[2]) + "\n";
+    off += numbers;
+    continued += "v " + numbers;
+  }
+  for (const auto& side : sides) {
+    off += "4";
+    continued += "f";
+    for (std::size_t i = 0; i < 4; ++i) {
+      off += " " + std::to_string(side[i]);
+      continued += " " + std::to_string(side[i] + 1) + (i == 1 ? " \\\r\n" : "");
+    }
+    off += " 255 0 0\n";
+    continued += "\n";
+  }
+  const auto cuboid = read_surface(continued);
+  REQUIRE(cuboid);
+  const std::string ascii = ascii_stl(*cuboid);
+  std::string parted = ascii;
+  std::string commas = ascii;
+  for (const auto& [from, to] :
+       {std::pair("endloop", "end loop"), std::pair("endfacet", "end facet"),
+        std::pair("endsolid", "end solid")}) {
+    for (std::size_t at = parted.find(from); at != parted.npos; at = parted.find(from, at + 9)) {
+      parted.replace(at, std::string_view(from).size(), to);
+    }
+  }
+  std::replace(commas.begin(), commas.end(), '.', ',');
+  const std::string tail(37, '\0');
+  const struct {
+    const char* what;
+    std::string bytes;
+    SurfaceFormat format;
+  } files[] = {
+      {"OBJ", continued, SurfaceFormat::obj},
+      {"OFF", off, SurfaceFormat::off},
+      {"PLY", ply("ascii"), SurfaceFormat::ply},
+      {"PLY, little-endian", ply("binary_little_endian"), SurfaceFormat::ply},
+      {"PLY, big-endian", ply("binary_big_endian"), SurfaceFormat::ply},
+      {"STL", ascii, SurfaceFormat::stl},
+      {"STL with a byte-order mark", "\xef\xbb\xbf" + ascii, SurfaceFormat::stl},
+      {"STL with 'end loop'", parted, SurfaceFormat::stl},
+      {"STL with commas", commas, SurfaceFormat::stl},
+      {"binary STL", binary_stl(*cuboid), SurfaceFormat::stl},
+      {"binary STL with a tail", "x" + binary_stl(*cuboid).substr(1) + tail, SurfaceFormat::stl}};
+  for (const auto& file : files) {
+    INFO(file.what);
+    CHECK(surface_format(file.bytes) == file.format);
+    const auto surface = read_surface(file.bytes);
+    INFO((surface ? "" : surface.error().message));
+    REQUIRE(surface);
+    const auto solid = closed(*surface);
+    REQUIRE(solid);
+    CHECK(solid->volume == Approx(40000.0).epsilon(1e-6));
+    CHECK(surface->ignored_bytes ==
+          (file.bytes.ends_with(tail) && file.format == SurfaceFormat::stl ? 37 : 0));
+  }
+  for (const std::string& other : {std::string("mass(1.0,0.0,0.0),m;\n"), std::string("hello"),
+                                   std::string("RIFF\0\0\0\0WAVE", 12), std::string()}) {
+    CHECK(surface_format(other) == SurfaceFormat::unknown);
+  }
+  CHECK(read_surface("ply\nformat ascii 1.0\n").error().message.find("'end_header'") !=
+        std::string::npos);
+  CHECK(read_surface("OFF\n8 6 0\n0 0 0\n").error().message.find("three coordinates") !=
+        std::string::npos);
+  CHECK(read_surface("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n")
+            .error()
+            .message.find("from 0 to 2, found '7'") != std::string::npos);
+}
+
 TEST_CASE("OBJ faces with many corners and negative indices are read", "[surface]") {
   const auto cube = read_obj(
       "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n"
@@ -221,7 +348,8 @@ TEST_CASE("random bytes do not crash the readers", "[surface]") {
           break;
       }
     }
-    for (const auto& surface : {read_stl(bytes), read_obj(bytes)}) {
+    for (const auto& surface :
+         {read_stl(bytes), read_obj(bytes), read_ply(bytes), read_off(bytes)}) {
       if (!surface) {
         CHECK_FALSE(surface.error().message.empty());
         continue;
