@@ -324,6 +324,7 @@ Playing make_playing(const Network& network, const Preset& preset, const Proof& 
       .glide_s = preset.glide_s,
       .pitches = keys.pitches,
       .key_pitches = keys.by_key,
+      .warp = keys.warp,
       .along = keys.along,
       .highest_factor = keys.highest_factor,
       .home = proof.margins.home,

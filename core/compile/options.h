@@ -24,7 +24,7 @@ struct CompileOptions {
   int voices = 0;         // replaces the preset's number; 0: the preset's
   NoteShare::Part share;  // share of the notes that this engine plays
   Precision precision = Precision::float64;
-  std::optional<Method> method;  // replaces the plan's choice, or the bare network's direct form
+  std::optional<Method> method;  // replaces the plan's choice
   std::optional<Budget> budget;  // replaces the preset's
   Isa isa = best_isa();          // no wider than the machine's
   std::uint32_t most_modes = patient_modes;  // masses of a part up to which modes are computed
@@ -48,11 +48,11 @@ struct CompileRequest {
   double rate_ratio = rate_ratio_of(options.rate_hz, options.rescale);
   int voices = options.voices > 0 ? options.voices : preset.voices;
 
-  // Returns whether the output has to be the published scheme to the bit: a bare network without a
-  // budget or another method.
+  // Returns whether the output has to be the published scheme to the bit: a bare network by the
+  // direct method, without a budget.
   bool is_published() const {
-    return options.bare && (!options.method || *options.method == Method::direct) &&
-           !budget.is_physical() && budget.silence_db == -Budget::unlimited;
+    return options.bare && options.method == Method::direct && !budget.is_physical() &&
+           budget.silence_db == -Budget::unlimited;
   }
 };
 

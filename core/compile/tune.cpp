@@ -8,6 +8,7 @@
 #include "core/compile/accuracy/loaded_waveguide.h"
 #include "core/compile/accuracy/pitches.h"
 #include "core/compile/instrument.h"
+#include "core/kernels/oversampled/oversampled_form.h"
 #include "core/model/preset/fit.h"
 
 namespace ressort::compile {
@@ -52,6 +53,30 @@ Pitches sharpened(const Pitches& pitches, const Preset& preset) {
         pitches.factor_at(hz * std::exp2(value_at(preset.flattening_cents, key) / 1200.0));
   }
   return sharp;
+}
+
+// Returns the ratio of the factors at which one step a sample and several have the pitch of a key.
+// Empty if no part lets low keys take one step.
+Pitches find_warp(const CompileRequest& request, const Machine& machine,
+                  const LowestShapes& shapes) {
+  double times = 1.0;
+  for (const Program& program : machine.parts) {
+    const auto* steps = program.form.get_if<Oversampled>();
+    times = steps != nullptr && steps->coarse ? std::max<double>(times, steps->times) : times;
+  }
+  if (times == 1.0) {
+    return {};
+  }
+  const auto at_step = [&](double step) {
+    return make_pitches(shapes, {.step = step}, request.options.rate_hz, request.rate_ratio);
+  };
+  Pitches warp = at_step(1.0);
+  const Pitches fine = at_step(1.0 / times);
+  warp.factors.resize(std::min(warp.factors.size(), fine.factors.size()));
+  for (std::size_t i = 0; i < warp.factors.size(); ++i) {
+    warp.factors[i] /= fine.factors[i];
+  }
+  return warp;
 }
 
 // Returns the parameter along which keys stay in tune and its range, without pitches.
@@ -183,6 +208,7 @@ TunedKeys tune(const CompileRequest& request, const Network& network, const Anal
                          std::to_string(most_loading_springs) + " springs are attached to it");
   }
   keys.pitches = sharpened(found.pitches, request.preset);
+  keys.warp = find_warp(request, planned.machine, *analysis.shapes);
   keys.mode = analysis.mode();
   keys.mode->frequency_hz = keys.pitches.frequency_at(1.0);
   keys.along = find_pitches_along(request, network, planned.machine);

@@ -17,6 +17,7 @@ struct TunedKeys {
   Pitches pitches;           // pitches with the parameters at their start values; empty: untuned
   std::vector<Pitches>
       by_key;          // [key] the same at its own parameters, near its pitch; may be empty
+  Pitches warp;        // see Playing; may be empty
   PitchesAlong along;  // along the one parameter that leaves keys in tune; may be empty
   double highest_factor = 0.0;  // largest stiffness factor that keys may use
   std::vector<double> away;     // the same at equal steps from the box to the limits, as in Margins

@@ -461,7 +461,7 @@ struct Engine::Player {
   }
 
   // The pitch of a lane without a voice, which should take the fewest steps.
-  static constexpr VoicePitch resting{.omega = 1e-6, .share = 0.0, .is_new = true};
+  static constexpr VoicePitch resting{.warp = 1.0, .share = 0.0, .is_new = true};
 
   // Updates glides, energy and sleep. Called once in max_block_frames, counted from the engine's
   // start, so that the result does not depend on the block size.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace ressort::engine {
 namespace {
@@ -125,10 +124,13 @@ void Parameters::apply(Bank<T>& bank, const Voices& voices, EnergyWatch& watch) 
       if (!voice.awake || !(has_turned || is_tuned)) {
         continue;
       }
-      kernel.tune(lane - group.first,
-                  {.omega = 2.0 * std::numbers::pi * voice.sounding_hz / part.program.rate_hz,
-                   .share = voice.factor / highest,
-                   .is_new = voice.is_new});
+      const bool is_known = voice.sounding_hz > 0.0 && !playing_.warp.factors.empty();
+      kernel.tune(
+          lane - group.first,
+          {.warp =
+               is_known ? playing_.warp.factor_at(playing_.warp.inside(voice.sounding_hz)) : 0.0,
+           .share = voice.factor / highest,
+           .is_new = voice.is_new});
       if (voice.is_new) {
         watch.reset(lane, group.part);
         kernel.reset(lane - group.first);

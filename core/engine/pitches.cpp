@@ -55,6 +55,11 @@ double PitchesAlong::factor_at(double frequency_hz, double value) const {
   return std::exp(cubic(within - first, {log_of(0), log_of(1), log_of(2), log_of(3)}));
 }
 
+double Pitches::inside(double frequency_hz) const {
+  const double last = std::max(1.0, static_cast<double>(factors.size())) - 1.0;
+  return std::clamp(frequency_hz, lowest_hz, lowest_hz * std::exp2(last / 12.0));
+}
+
 double Pitches::frequency_at(double factor) const {
   double low = lowest_hz;
   double high = lowest_hz * std::exp2(static_cast<double>(factors.size()) / 12.0);

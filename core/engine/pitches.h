@@ -30,6 +30,8 @@ inline KeyFrequencies equal_temperament(double a4_hz, double transpose_semitones
 struct Pitches {
   double factor_at(double frequency_hz) const;  // 1 if the table is empty
   double frequency_at(double factor) const;     // inverse, by bisection to rounding
+  // Returns the frequency of the table that is nearest to this one.
+  double inside(double frequency_hz) const;
 
   double lowest_hz = 440.0 / 4096.0;
   std::vector<double> factors;  // ascending; empty: no mode is known

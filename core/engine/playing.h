@@ -117,6 +117,9 @@ struct Playing {
   Pitches pitches;                       // pitches of the lowest mode
   // [key] the same at its own parameters, near its pitch; may be empty
   std::vector<Pitches> key_pitches;
+  // Factor on the stiffness of a voice that takes one step a sample, at which its lowest mode has
+  // the pitch that it has at several; empty if all voices take the same steps.
+  Pitches warp;
   PitchesAlong along;           // replaces `pitches` where a parameter must leave keys in tune
   double highest_factor = 1.0;  // greatest stiffness factor that is proved stable
   std::vector<Limits> home;     // [parameter] range in which highest_factor holds; empty: anywhere

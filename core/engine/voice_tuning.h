@@ -95,9 +95,7 @@ class VoiceTuning {
     }
     // Beyond the key's table, the intervals of the common one hold.
     const Pitches& own = playing_.key_pitches[static_cast<std::size_t>(key)];
-    const double inside_hz =
-        std::clamp(frequency_hz, own.lowest_hz,
-                   own.lowest_hz * std::exp2(static_cast<double>(own.factors.size() - 1) / 12.0));
+    const double inside_hz = own.inside(frequency_hz);
     const double beyond = inside_hz == frequency_hz ? 1.0
                                                     : playing_.pitches.factor_at(frequency_hz) /
                                                           playing_.pitches.factor_at(inside_hz);

@@ -113,7 +113,7 @@ std::size_t copy_positions(std::span<const std::uint32_t> nodes, std::span<doubl
 
 // The pitch of a voice, by which a kernel may choose its steps.
 struct VoicePitch {
-  double omega = 0.0;   // of its lowest mode, rad per sample; 0: not known
+  double warp = 0.0;    // factor on the stiffness that keeps it in tune at one step; 0: not known
   double share = 1.0;   // of the highest stiffness factor at which the Program is stable
   bool is_new = false;  // reset() follows
 };

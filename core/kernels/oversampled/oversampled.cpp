@@ -1,7 +1,6 @@
 #include "core/kernels/oversampled/oversampled.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "core/kernels/oversampled/oversampled_form.h"
 
@@ -47,10 +46,8 @@ void OversampledKernel<T>::tune(std::size_t lane, const VoicePitch& pitch) {
     return;
   }
   const auto times = static_cast<double>(times_);
-  if (pitch.omega > 0.0 && pitch.share * times * times <= 1.0) {
-    const double ratio =
-        std::sin(0.5 * pitch.omega) / (times * std::sin(0.5 * pitch.omega / times));
-    warp_[lane] = static_cast<T>(ratio * ratio);
+  if (pitch.warp > 0.0 && pitch.share * times * times <= 1.0) {
+    warp_[lane] = static_cast<T>(pitch.warp);
     return;
   }
   const bool is_moved =

@@ -3,8 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <ctime>
+#include <filesystem>
+#include <optional>
 #include <stdexcept>
 
+#include "app/realtime/denormals.h"
+#include "core/model/language/print.h"
+#include "tests/bench/faust.h"
 #include "tests/bench/voicing/player.h"
 
 namespace ressort::voicing {
@@ -31,12 +37,93 @@ double median(std::vector<double> numbers) {
   return *middle;
 }
 
+// The published models, which FAUST plays too.
+constexpr std::array published{"IPlayTheTriangle", "PolyTriangle",      "PhysicalLFO",
+                               "Resonator",        "BowedString",       "PluckedHarmonics",
+                               "1000massString",   "LargeTriangleMesh", "20x30mesh"};
+
+// As many instances of a FAUST program as there are voices, summed as FAUST's polyphonic
+// architectures do. The first frame of every input excites them.
+class FaustVoices {
+ public:
+  FaustVoices(const bench::FaustLibrary& library, int voices, std::size_t inputs)
+      : library_(library), inputs_(inputs * bench::block_frames) {
+    for (int voice = 0; voice < voices; ++voice) {
+      instances_.push_back(library.make(static_cast<int>(played_rate_hz)));
+    }
+    const auto outputs = static_cast<std::size_t>(library.outputs(instances_[0]));
+    outputs_.resize(outputs * bench::block_frames);
+    sum_.resize(outputs_.size());
+    for (std::size_t i = 0; i < inputs; ++i) {
+      inputs_[i * bench::block_frames] = 0.01;
+      input_pointers_.push_back(inputs_.data() + i * bench::block_frames);
+    }
+    for (std::size_t i = 0; i < outputs; ++i) {
+      output_pointers_.push_back(outputs_.data() + i * bench::block_frames);
+    }
+  }
+  FaustVoices(const FaustVoices&) = delete;
+  FaustVoices& operator=(const FaustVoices&) = delete;
+  ~FaustVoices() {
+    for (void* const instance : instances_) {
+      library_.destroy(instance);
+    }
+  }
+
+  double processor_share() {
+    const auto blocks = static_cast<int>(played_s * played_rate_hz / bench::block_frames);
+    const realtime::DenormalsFlushed flushed;
+    const std::clock_t start = std::clock();
+    for (int block = 0; block < blocks; ++block) {
+      std::fill(sum_.begin(), sum_.end(), 0.0);
+      for (void* const instance : instances_) {
+        library_.compute(instance, bench::block_frames, input_pointers_.data(),
+                         output_pointers_.data());
+        for (std::size_t i = 0; i < sum_.size(); ++i) {
+          sum_[i] += outputs_[i];
+        }
+      }
+      std::fill(inputs_.begin(), inputs_.end(), 0.0);
+    }
+    return static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC / played_s;
+  }
+
+ private:
+  const bench::FaustLibrary& library_;
+  std::vector<void*> instances_;
+  std::vector<double> inputs_;
+  std::vector<double> outputs_;
+  std::vector<double> sum_;
+  std::vector<double*> input_pointers_;
+  std::vector<double*> output_pointers_;
+};
+
+// Returns the least share of a core that FAUST's code of the preset's model takes in double
+// precision, of all options and compilers; nothing if there is none.
+std::optional<double> faust_share(const Player& player, int voices, int turns) {
+  const Network& network = player.scene().network;
+  const bench::BenchScene scene{.text = print_network(network)};
+  std::optional<double> best;
+  for (const bench::FaustLibrary& library : bench::faust_libraries(
+           scene, network, std::filesystem::temp_directory_path() / "ressort-faust")) {
+    std::vector<double> shares;
+    for (int turn = 0; turn < turns && library.is_double; ++turn) {
+      shares.push_back(FaustVoices(library, voices, network.inputs.size()).processor_share());
+    }
+    if (!shares.empty()) {
+      best = std::min(best.value_or(1e9), median(shares));
+    }
+  }
+  return best;
+}
+
 }  // namespace
 
 int print_played(const std::vector<std::string>& names, int turns) {
   std::printf(
-      "| %% of a core | voices | idle | one | all | re-struck | low keys | high keys |\n"
-      "| --- | --- | --- | --- | --- | --- | --- | --- |\n");
+      "| %% of a core | voices | idle | one | all | re-struck | low keys | high keys "
+      "| FAUST, all |\n"
+      "| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n");
   int failures = 0;
   for (const std::string& name : names) {
     try {
@@ -60,7 +147,11 @@ int print_played(const std::vector<std::string>& names, int turns) {
       for (const std::vector<double>& share : shares) {
         std::printf("| %.2f ", 100.0 * median(share));
       }
-      std::printf("|\n");
+      const bool is_published =
+          std::find(published.begin(), published.end(), name) != published.end();
+      const std::optional<double> faust =
+          is_published ? faust_share(player, voices, turns) : std::nullopt;
+      faust ? std::printf("| %.2f |\n", 100.0 * *faust) : std::printf("| |\n");
       std::fflush(stdout);
     } catch (const std::runtime_error& error) {
       std::fprintf(stderr, "%s\n", error.what());

@@ -111,7 +111,8 @@ TEST_CASE("a low voice takes one step a sample at the pitch of several", "[overs
   constexpr double stiffness = 0.05;  // 1,570 Hz: one step would be 3.4 cents sharp
   const double omega = omega_of(stiffness);
   Bare<double> bare(oscillator(stiffness, true), 2);
-  bare.kernel().tune(0, {.omega = omega, .share = 1.0 / (times * times), .is_new = true});
+  const double ratio = std::sin(0.5 * omega) / (times * std::sin(0.5 * omega / times));
+  bare.kernel().tune(0, {.warp = ratio * ratio, .share = 1.0 / (times * times), .is_new = true});
   bare.kernel().reset(0);
   std::vector<std::vector<double>> heard(2);
   for (int n = 0; n < 20000; ++n) {
@@ -143,13 +144,13 @@ TEST_CASE("a voice that is bent beyond the limit of one step takes several", "[o
   constexpr double stiffness = 0.05;
   const Program program = oscillator(stiffness, true);
   Bare<double> bare(program);
-  bare.kernel().tune(0, {.omega = omega_of(stiffness), .share = 0.01, .is_new = true});
+  bare.kernel().tune(0, {.warp = 1.0, .share = 0.01, .is_new = true});
   bare.kernel().reset(0);
   double before = 0.0;
   for (int n = 0; n < 1000; ++n) {
     before = bare.step({})[0];
   }
-  bare.kernel().tune(0, {.omega = omega_of(100.0 * stiffness), .share = 1.0});
+  bare.kernel().tune(0, {.warp = 1.0, .share = 1.0});
   double x = 0.0;
   double v = 0.0;
   REQUIRE(bare.kernel().save(0, &x, &v));
