@@ -317,8 +317,7 @@ TEST_CASE("elements beside a string act on it", "[chains]") {
   }
 }
 
-// One string between a position input and a ground stays in registers. Neighbours are in the same
-// pack or in different packs.
+// Neighbours are in the same pack or in different packs.
 TEST_CASE("elements beside a short string act on it", "[chains]") {
   for (const int count : {9, 31, 32, 77, 160}) {
     CAPTURE(count);
