@@ -31,8 +31,7 @@ template <class T>
 GridKernel<T>::GridKernel(const Program& program, const Grid& grid, std::size_t, Isa isa)
     : NodeKernel<T>(program, layout_in_rows<T>(grid.slot, grid.slots, 1, 3)),
       grid_(grid),
-      loops_(
-          with_isa(isa, [&]<Isa level>() { return grid_loops<level, T>(whole_pack_bytes(isa)); })),
+      step_(with_isa(isa, [&]<Isa level>() { return grid_step<level, T>(); })),
       held_(grid.links.size() * 5),
       offset_(offsets_of(grid)),
       shift_((furthest_offset(grid) + grid_line - 1) / grid_line * grid_line),
@@ -48,7 +47,7 @@ GridKernel<T>::GridKernel(const Program& program, const Grid& grid, std::size_t,
   }
   y_.resize(grid.segments.empty() ? 0 : grid.slots + shift_);
   link_force_.resize(offset_.size() * grid.slots);
-  make_stamps(whole_pack_bytes(isa) / sizeof(T));
+  make_stamps(grid_pack_bytes(isa) / sizeof(T));
   this->reset_lanes();
 }
 
@@ -141,7 +140,7 @@ GridState<T> GridKernel<T>::state() {
 template <class T>
 void GridKernel<T>::play(const Block<T>& block) {
   GridState<T> played = state();
-  loops_.step(this->program_, grid_, played, block);
+  step_(this->program_, grid_, played, block);
   is_forward_ = played.is_forward;
   is_fresh_ = played.is_fresh;
   pushes_ = played.pushes;

@@ -41,14 +41,11 @@ struct GridState {
 };
 
 template <class T>
-struct GridLoops {
-  void (*step)(const Program& program, const Grid& grid, GridState<T>& state,
-               const Block<T>& block);
-};
+using GridStep = void (*)(const Program& program, const Grid& grid, GridState<T>& state,
+                          const Block<T>& block);
 
-// Returns the functions for packs of this size, which must be a full register.
 template <Isa isa, class T>
-GridLoops<T> grid_loops(std::size_t bytes);
+GridStep<T> grid_step();
 
 template <class T>
 class GridKernel final : public NodeKernel<T> {
@@ -63,7 +60,7 @@ class GridKernel final : public NodeKernel<T> {
   void make_stamps(std::size_t lanes);
 
   const Grid& grid_;
-  GridLoops<T> loops_;
+  GridStep<T> step_;
   Aligned<T> y_;
   Aligned<T> link_force_;
   Aligned<T> held_;

@@ -503,7 +503,7 @@ std::optional<Grid> grid_form(const Program& program, const Progress& progress) 
 // Counts per voice: five operations a pack of slots and one for each offset, or seven for every
 // link law; links that fit into no row are stepped number by number.
 double operations(const Program& program, const Grid& form, const Workload& load) {
-  const double lanes = static_cast<double>(whole_pack_bytes(load.isa)) / bytes_of_number(load);
+  const double lanes = static_cast<double>(grid_pack_bytes(load.isa)) / bytes_of_number(load);
   double count = 60.0 + 8.0 * static_cast<double>(form.rest_ends.size() + form.ports.size()) +
                  150.0 * static_cast<double>(program.taps.size()) + passive_operations(program);
   for (const GridSegment& segment : form.segments) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "core/kernels/isa.h"
 #include "core/kernels/program.h"
 #include "core/progress.h"
 
@@ -82,6 +83,11 @@ inline constexpr std::uint32_t least_grid_masses = 16;
 // of numbering. Few links may be left over, and no output may be a force. O(n log n). [any thread
 // but audio]
 std::optional<Grid> grid_form(const Program& program, const Progress& progress = {});
+
+// Returns the pack width. Many machines process AVX-512 registers in two halves.
+constexpr std::size_t grid_pack_bytes(Isa isa) {
+  return isa == Isa::v4 ? vector_bytes(Isa::v3) : vector_bytes(isa);
+}
 
 // Functions for the registry's row; memory is per voice, in bytes.
 double operations(const Program& program, const Grid& form, const Workload& load);

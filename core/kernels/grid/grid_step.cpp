@@ -512,27 +512,19 @@ void step(const Program& program, const Grid& grid, GridState<T>& state, const B
   }
 }
 
-template <class T>
-GridLoops<T> loops_for(std::size_t bytes) {
-  constexpr std::size_t widest = vector_bytes(Isa::RESSORT_ISA);
-  return with_bytes < widest, widest == 64 ? 32 : widest > (bytes, []<std::size_t pack>() {
-                                                    return GridLoops<T>{step<T, pack>};
-                                                  });
-}
-
 }  // namespace
 }  // namespace ressort::kernels::RESSORT_ISA
 
 namespace ressort::kernels {
 
 template <>
-GridLoops<float> grid_loops<Isa::RESSORT_ISA, float>(std::size_t bytes) {
-  return RESSORT_ISA::loops_for<float>(bytes);
+GridStep<float> grid_step<Isa::RESSORT_ISA, float>() {
+  return RESSORT_ISA::step<float, grid_pack_bytes(Isa::RESSORT_ISA)>;
 }
 
 template <>
-GridLoops<double> grid_loops<Isa::RESSORT_ISA, double>(std::size_t bytes) {
-  return RESSORT_ISA::loops_for<double>(bytes);
+GridStep<double> grid_step<Isa::RESSORT_ISA, double>() {
+  return RESSORT_ISA::step<double, grid_pack_bytes(Isa::RESSORT_ISA)>;
 }
 
 }  // namespace ressort::kernels
