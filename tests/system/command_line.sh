@@ -91,6 +91,7 @@ expect 2 "needs --loss" "$program" body --statistical 100:0.05,900:0.01
 expect 2 "900 modes, more than the limit of 400" "$program" body --statistical 100:1,1000:1 --loss 1
 expect 2 "ascending frequencies of 1 to 20000" "$program" body --statistical 900:1,100:1 --loss 1
 expect 2 "expected HZ,Q, HZ,Q,BRIDGE" "$program" body --statistical 9:1,90:1 --loss 1 --mode 275
+model box.obj 'v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n'
 expect 2 "a solid has one loss factor" "$program" body box.obj --loss 100:0.1,900:0.2
 command=$(sed -n '/^# ressort body/,/[^\\]$/p' "$source/models/Soundboard.mdl" |
   sed 's/^# *\(ressort\)\{0,1\}//; s/\\$//' | tr '\n' ' ')
@@ -295,7 +296,8 @@ model infinite.mdl '@g ground 0.\n@m mass 1. 0. 0.\n@r spring @g @m [0/0]\n'
 model late.score '1e300 /note/on 60\n'
 expect 2 "where a time in seconds was expected, at most a day" \
   "$program" render PolyTriangle -o out.wav --score late.score
-expect 2 "cannot be the output" "$program" render PolyTriangle -o bad.score --score bad.score
+model good.score '0.0 /note/on 60 100\n'
+expect 2 "cannot be the output" "$program" render PolyTriangle -o good.score --score good.score
 expect 2 "word.mdl' has no known sound file ending; use one of .wav, .w64, .flac, .ogg" \
   "$program" render PolyTriangle -o word.mdl
 expect 2 "must be -120 to 60, found nan" "$program" play -g nan

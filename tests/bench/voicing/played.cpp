@@ -42,7 +42,7 @@ constexpr std::array published{"IPlayTheTriangle", "PolyTriangle",      "Physica
                                "Resonator",        "BowedString",       "PluckedHarmonics",
                                "1000massString",   "LargeTriangleMesh", "20x30mesh"};
 
-// As many instances of a FAUST program as there are voices, summed as FAUST's polyphonic
+// One instance of a FAUST program for each voice, summed as FAUST's polyphonic
 // architectures do. The first frame of every input excites them.
 class FaustVoices {
  public:

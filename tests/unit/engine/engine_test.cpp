@@ -340,7 +340,8 @@ TEST_CASE("a bare engine equals its kernel bit for bit", "[engine]") {
       continue;
     }
     const Network network = network_of(example.text);
-    Player player(example.text, default_preset(network, true), {.bare = true});
+    Player player(example.text, default_preset(network, true),
+                  {.bare = true, .method = Method::direct});
     Bare<double> kernel(make_program(network, 44100.0, true));
     const std::size_t frames = 5000;
     std::vector<std::vector<double>> inputs(network.inputs.size());

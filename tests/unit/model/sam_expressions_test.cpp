@@ -57,7 +57,7 @@ const std::string drum =
 // The scheme of Synth-A-Modeler: forces from the positions one sample before and their differences,
 // then x += v with v += f/(m fs^2).
 TEST_CASE("masses, links and their forces agree with the scheme of Synth-A-Modeler",
-          "[synth_a_modeler]") {
+          "[sam_expressions]") {
   const auto y = rendered(
       "faustcode: k=hslider(\"k\",2200.0,500.0,4000.0,100.0);\n"
       "mass(0.01,0.0,0.2),a;\nmass(0.03,0.0,-0.3),b;\nground(0.0),g;\n"
@@ -92,7 +92,7 @@ TEST_CASE("masses, links and their forces agree with the scheme of Synth-A-Model
   CHECK(worst < 1e-9 * most);
 }
 
-TEST_CASE("the force of a touch is heard at an end of its own", "[synth_a_modeler]") {
+TEST_CASE("the force of a touch is heard at an end of its own", "[sam_expressions]") {
   const std::string text = drum + "port(),hand;\ntouch(500.0,0.0,0.002),hit,hand,head;\n";
   // 400 x = 500 (0.004 - x - 0.002) at rest.
   const auto y = rendered(text + "audioout,a,hit;\naudioout,b,skin;\n", 44100, 0.004);
@@ -106,7 +106,7 @@ TEST_CASE("the force of a touch is heard at an end of its own", "[synth_a_modele
   }));
 }
 
-TEST_CASE("FAUST expressions of numbers have their value", "[synth_a_modeler]") {
+TEST_CASE("FAUST expressions of numbers have their value", "[sam_expressions]") {
   const std::string sliders =
       "faustcode: note=hslider(\"Note\",57.0,least,90.0,1.0);\nfaustcode: least=20.0;\n"
       "faustcode: half=0.5*vslider(\"Half\",3.0,0.0,9.0,0.1) : smooth(0.999);\n"
@@ -148,7 +148,7 @@ TEST_CASE("FAUST expressions of numbers have their value", "[synth_a_modeler]") 
 }
 
 TEST_CASE("a constant output is silent, and a definition without use is no error",
-          "[synth_a_modeler]") {
+          "[sam_expressions]") {
   const auto y = rendered("faustcode: low=highpass(4,20.0);\nfaustcode: noise=fancy(x) ~ _;\n" +
                               drum + "audioout,a0,0.0;\naudioout,a1,head+0.25;\n",
                           3);
@@ -156,7 +156,7 @@ TEST_CASE("a constant output is silent, and a definition without use is no error
   CHECK(y[1].back() == 0.25);
 }
 
-TEST_CASE("what is left out of an output causes one warning", "[synth_a_modeler]") {
+TEST_CASE("what is left out of an output causes one warning", "[sam_expressions]") {
   const auto warnings = warnings_of("faustcode: room=reverb(0.3);\n" + drum +
                                     "audioout,a,head:room:room;\naudioout,b,head*2.0:room;\n");
   REQUIRE(warnings.size() >= 1);
@@ -168,7 +168,7 @@ TEST_CASE("what is left out of an output causes one warning", "[synth_a_modeler]
 
 // Strings of one impedance, fixed at one end and tied at the other, resonate where the sum of
 // cot(pi f T) is 0, with T the time from the knot to the fixed end and back.
-TEST_CASE("a junction may join any number of waveguides", "[synth_a_modeler]") {
+TEST_CASE("a junction may join any number of waveguides", "[sam_expressions]") {
   const double times[] = {0.0050, 0.0041, 0.0057, 0.0046, 0.0035};
   for (const int count : {1, 3, 5}) {
     std::string text = "port(),hand;\ntouch(9.0,0.0,0.0),hit,hand,j;\njunction(0.0),j;\n";
@@ -200,13 +200,13 @@ TEST_CASE("a junction may join any number of waveguides", "[synth_a_modeler]") {
   }
 }
 
-TEST_CASE("a junction without waveguides is left out", "[synth_a_modeler]") {
+TEST_CASE("a junction without waveguides is left out", "[sam_expressions]") {
   const auto warnings = warnings_of(drum + "junction(0.0),j;\naudioout,a,head;\n");
   CHECK(warnings[0] == "4:15: left out: 'j' joins no waveguide");
 }
 
 // A pluck with an offset pushes the string when the hand is near that offset, not near 0.
-TEST_CASE("a pluck acts around its offset", "[synth_a_modeler]") {
+TEST_CASE("a pluck acts around its offset", "[sam_expressions]") {
   for (const char* const ends : {"head,hand", "hand,head"}) {
     // The first end is the offset above the second.
     const double place = ends[1] == 'e' ? -0.01 : 0.01;
@@ -222,7 +222,7 @@ TEST_CASE("a pluck acts around its offset", "[synth_a_modeler]") {
 }
 
 // Models in the style of the published ones: each way to write an output, with each excitation.
-TEST_CASE("models in the style of the published ones are read", "[synth_a_modeler]") {
+TEST_CASE("models in the style of the published ones are read", "[sam_expressions]") {
   const std::string definitions =
       "# Example MDL file\n\nfaustcode:vol=hslider(\"Ze Volume\",-12.0,-40.0,40.0,1.0) : db2linear "
       ": onePoleBLT(2.0); // smooth\nfaustcode: outputDSP=highpass(4,20.0);\n"
