@@ -10,10 +10,11 @@ namespace {
 // Assigns places to nodes and translates the tables from nodes to places.
 class TablesMaker {
  public:
-  TablesMaker(const Program& program, const Chains& form, std::size_t lanes)
+  TablesMaker(const Program& program, const Chains& form, FoldedBy by)
       : program_(program),
         form_(form),
-        lanes_(static_cast<std::uint32_t>(lanes)),
+        lanes_(static_cast<std::uint32_t>(by.lanes)),
+        short_packs_(static_cast<std::uint32_t>(by.short_packs)),
         place_(tables_.place),
         site_mass_(program.position.size(), nowhere),
         force_(program.position.size(), nowhere) {
@@ -35,6 +36,9 @@ class TablesMaker {
           .push_back({place_[input.node], force_at(input.node), i});
     }
     make_outputs();
+    if (short_packs_ > 0) {
+      shorten();
+    }
     return std::move(tables_);
   }
 
@@ -49,7 +53,8 @@ class TablesMaker {
   void fold_chains() {
     std::uint32_t next = 0;
     for (const Chain& chain : form_.chains) {
-      const std::uint32_t packs = (chain.count + lanes_ - 1) / lanes_;
+      const std::uint32_t packs =
+          short_packs_ > 0 ? short_packs_ : (chain.count + lanes_ - 1) / lanes_;
       for (std::uint32_t i = 0; i < chain.count; ++i) {
         const std::uint32_t node = form_.nodes[chain.first + i];
         place_[node] = place_of(next + i % packs, i / packs);
@@ -243,38 +248,75 @@ class TablesMaker {
     }
   }
 
+  // Prepares the step of a single chain that stays in registers.
+  void shorten() {
+    for (std::uint32_t i = 0; i < tables_.sites.size(); ++i) {
+      const ChainSite& site = tables_.sites[i];
+      tables_.short_sites.push_back({site.pair / (2 * lanes_), site.unit, i});
+    }
+    std::stable_sort(tables_.short_sites.begin(), tables_.short_sites.end(),
+                     [](const ShortSite& a, const ShortSite& b) { return a.pack < b.pack; });
+    tables_.short_sites.emplace_back();
+    const auto read = [&](ChainPlace place) {
+      const std::uint32_t pair = place / (2 * lanes_);
+      tables_.short_read |= pair < short_packs_ ? 1u << pair : 0u;
+    };
+    for (const PlacedEnds& ends : tables_.ends) {
+      read(ends.a);
+      read(ends.b);
+    }
+    for (const HeardPosition& output : tables_.heard_positions) {
+      read(output.place);
+    }
+    const std::uint32_t count = form_.chains[0].count;
+    if (count < short_packs_ * lanes_) {
+      tables_.short_end = place_of(count % short_packs_, count / short_packs_);
+    }
+  }
+
   const Program& program_;
   const Chains& form_;
   std::uint32_t lanes_;
+  std::uint32_t short_packs_;
   ChainsTables tables_;
   std::vector<ChainPlace>& place_;
   std::vector<std::uint32_t> site_mass_;  // [node] Coefficient, if the node is in a chain.
   std::vector<std::uint32_t> force_;      // [node]
 };
 
+template <Isa isa, class T>
+ChainsLoops<T> loops_for(FoldedBy by) {
+  ChainsLoops<T> loops = chains_loops<isa, T>(by.lanes * sizeof(T));
+  if (by.short_packs > 0) {
+    loops.step = short_chain_step<isa, T>(by.lanes * sizeof(T), by.short_packs);
+  }
+  return loops;
+}
+
 }  // namespace
 
 template <class T>
 ChainsKernel<T>::ChainsKernel(const Program& program, const Chains& form, std::size_t, Isa isa)
     : ChainsKernel(program, form,
-                   TablesMaker(program, form, lanes_to_fold(form, isa, sizeof(T))).make(),
-                   lanes_to_fold(form, isa, sizeof(T)), isa) {}
+                   TablesMaker(program, form, fold_by(program, form, isa, sizeof(T))).make(),
+                   fold_by(program, form, isa, sizeof(T)), isa) {}
 
 template <class T>
 ChainsKernel<T>::ChainsKernel(const Program& program, const Chains& form, ChainsTables tables,
-                              std::size_t lanes, Isa isa)
+                              FoldedBy by, Isa isa)
     : NodeKernel<T>(program, {.node = tables.place,
                               .lane = {0},
-                              .row = lanes,
+                              .row = by.lanes,
                               .rows = 2,
-                              .size = 2 * lanes * tables.pairs}),
+                              .size = 2 * by.lanes * tables.pairs}),
       tables_(std::move(tables)),
-      step_(with_isa(isa, [&]<Isa level>() { return chains_step<level, T>(lanes * sizeof(T)); })),
-      masks_(4 * lanes * tables_.chains.size()),
-      units_(lanes * lanes),
+      loops_(with_isa(isa, [&]<Isa level>() { return loops_for<level, T>(by); })),
+      masks_(4 * by.lanes * tables_.chains.size()),
+      units_(by.lanes * by.lanes),
       held_(4 * tables_.chains.size()),
       force_(tables_.force_count),
       tap_pull_(program.taps.size()) {
+  const std::size_t lanes = by.lanes;
   for (std::size_t i = 0; i < form.chains.size(); ++i) {
     const std::uint32_t packs = tables_.chains[i].packs;
     const std::size_t last_lane = (form.chains[i].count - 1) / packs;
@@ -326,7 +368,7 @@ ChainsState<T> ChainsKernel<T>::state() {
 template <class T>
 void ChainsKernel<T>::play(const Block<T>& block) {
   ChainsState<T> played = state();
-  step_(this->program_, tables_, played, block);
+  loops_.step(this->program_, tables_, played, block);
   this->coefficients.finish(block.frames);
 }
 

@@ -2,9 +2,12 @@
 // mass's neighbours lie in the packs before and after its own. One pass over memory then computes
 //  y = K x + Z v,  v += (y[i-1] - 2 y[i] + y[i+1])/M,  x += v
 // (symplectic Euler, the 1-D wave equation). A stiff chain has a second y over the masses two
-// places away. All other links and masses are stepped one by one. Their forces on a chain's mass
-// are added to v and x after the pass, which is equivalent to adding them to the sum.
+// places away. One chain that is short enough stays in registers for a block of samples. All other
+// links and masses are stepped one by one. Their forces on a chain's mass are added to v and x
+// after the pass, which is equivalent to adding them to the sum.
 #pragma once
+
+#include <utility>
 
 #include "core/kernels/chains/chains_form.h"
 #include "core/kernels/nodes.h"
@@ -36,6 +39,13 @@ struct ChainSite {
   ChainPlace pair = 0;
   std::uint32_t unit = 0;          // Pack of ChainsState::units for its lane.
   std::uint32_t inverse_mass = 0;  // Coefficient.
+};
+
+// The same for a chain in registers.
+struct ShortSite {
+  std::uint32_t pack = nowhere;
+  std::uint32_t unit = 0;
+  std::uint32_t force = 0;  // Index into ChainsState::force.
 };
 
 struct LoosePlaces {
@@ -117,6 +127,10 @@ struct ChainsTables {
   // Slots of sites, loose masses, listened nodes and points, then those that are never read.
   std::size_t force_count = 0;
   std::size_t pairs = 0;
+  // Used if one chain stays in registers:
+  std::vector<ShortSite> short_sites;  // Sorted by pack; the last one is in none.
+  std::uint32_t short_read = 0;        // Bit mask of its pairs that others read.
+  ChainPlace short_end = nowhere;      // The empty place after its last mass, if there is one.
 };
 
 // All data that one step of ChainsKernel reads and writes.
@@ -142,10 +156,22 @@ template <class T>
 using ChainsStep = void (*)(const Program& program, const ChainsTables& tables,
                             ChainsState<T>& state, const Block<T>& block);
 
-// Returns the function for packs of this size.
-template <Isa isa, class T>
-ChainsStep<T> chains_step(std::size_t bytes);
+template <class T>
+struct ChainsLoops {
+  ChainsStep<T> step;
+};
 
+// Returns the functions for packs of this size.
+template <Isa isa, class T>
+ChainsLoops<T> chains_loops(std::size_t bytes);
+
+// Numbers of packs for which a step in registers exists, and that step; null if the instruction set
+// has too few registers.
+using ShortPacks = std::index_sequence<1, 2, 3, 4, 5, 6, 8, 10, 13>;
+template <Isa isa, class T>
+ChainsStep<T> short_chain_step(std::size_t bytes, std::size_t packs);
+
+struct FoldedBy;
 template <class T>
 class ChainsKernel final : public NodeKernel<T> {
  public:
@@ -153,14 +179,14 @@ class ChainsKernel final : public NodeKernel<T> {
   bool copy_from(const Kernel<T>& from) override;
 
  private:
-  ChainsKernel(const Program& program, const Chains& form, ChainsTables tables, std::size_t lanes,
+  ChainsKernel(const Program& program, const Chains& form, ChainsTables tables, FoldedBy by,
                Isa isa);
   void clear(std::size_t lane) override;
   void play(const Block<T>& block) override;
   ChainsState<T> state();
 
   ChainsTables tables_;
-  ChainsStep<T> step_;
+  ChainsLoops<T> loops_;
   Aligned<T> masks_;
   Aligned<T> units_;
   Aligned<T> held_;

@@ -172,8 +172,12 @@ class ChainFinder {
     if (row.size() < least_chain_masses) {
       return;
     }
-    const std::uint32_t left = held_by(near_[row.front()].holder, row.front(), springs);
-    const std::uint32_t right = held_by(near_[row.back()].holder, row.back(), springs);
+    std::uint32_t left = held_by(near_[row.front()].holder, row.front(), springs);
+    std::uint32_t right = held_by(near_[row.back()].holder, row.back(), springs);
+    if (is_fixed_ground(program_, left) && !is_fixed_ground(program_, right)) {
+      std::swap(left, right);
+      std::reverse(row.begin(), row.end());
+    }
     Chain chain{.first = static_cast<std::uint32_t>(found.nodes.size()),
                 .count = static_cast<std::uint32_t>(row.size()),
                 .mass_run = mass_run_[row[0]],
@@ -262,9 +266,34 @@ class ChainFinder {
   Chains form_;
 };
 
+// Returns whether the form is a single chain with an end on a ground, and nothing needs to see all
+// of it in each sample.
+bool is_simple(const Program& program, const Chains& form) {
+  const Chain& chain = form.chains[0];
+  const MassRun& mass = program.mass_runs[chain.mass_run];
+  const auto is_force = [](const OutputSlot& output) { return output.is_force; };
+  return form.chains.size() == 1 && !chain.is_stiff && !mass.is_oscillator && !mass.has_gravity &&
+         program.taps.empty() && is_plain(program) && is_fixed_ground(program, chain.right) &&
+         std::none_of(program.outputs.begin(), program.outputs.end(), is_force);
+}
+
+// Returns the smallest number of packs that has a step in registers, or 0.
+template <std::size_t... counts>
+std::size_t short_packs(std::size_t least, std::size_t most, std::index_sequence<counts...>) {
+  std::size_t packs = 0;
+  static_cast<void>(((counts >= least && counts <= most && (packs = counts, true)) || ...));
+  return packs;
+}
+
 }  // namespace
 
-std::size_t lanes_to_fold(const Chains& form, Isa isa, std::size_t number_bytes) {
+bool is_fixed_ground(const Program& program, std::uint32_t node) {
+  return node != Chain::free &&
+         std::none_of(program.inputs.begin(), program.inputs.end(),
+                      [&](const InputSlot& input) { return input.node == node; });
+}
+
+FoldedBy fold_by(const Program& program, const Chains& form, Isa isa, std::size_t number_bytes) {
   const std::size_t whole = whole_pack_bytes(isa) / number_bytes;
   std::uint32_t longest = 0;
   std::uint32_t shortest_stiff = nowhere;
@@ -272,13 +301,21 @@ std::size_t lanes_to_fold(const Chains& form, Isa isa, std::size_t number_bytes)
     longest = std::max(longest, chain.count);
     shortest_stiff = chain.is_stiff ? std::min(shortest_stiff, chain.count) : shortest_stiff;
   }
+  // Uses the widest packs if there are enough registers for the whole chain.
+  if (is_simple(program, form)) {
+    const std::size_t most = isa == Isa::v4 ? 13 : 8;
+    const std::size_t packs = short_packs((longest + whole - 1) / whole, most, ShortPacks{});
+    if (packs > 0) {
+      return {whole, packs};
+    }
+  }
   // Uses the widest packs for which the longest chain has enough passes to outweigh the cost at its
   // ends. In a stiff chain a mass and the next but one must be in different pairs.
   std::size_t lanes = whole;
   while (lanes > 16 / number_bytes && (longest < 3 * lanes || shortest_stiff <= lanes)) {
     lanes /= 2;
   }
-  return lanes;
+  return {lanes, 0};
 }
 
 std::optional<Chains> chains_form(const Program& program, const Progress& progress) {
@@ -294,17 +331,22 @@ std::optional<Chains> chains_form(const Program& program, const Progress& progre
   return ChainFinder(program, progress).find();
 }
 
-// Counts per voice: a chain costs three operations a pack of masses, and the work at its ends. All
-// other elements are stepped one by one.
+// Counts per voice: a chain that stays in registers costs three operations a pack of masses; one in
+// memory costs the same plus the work at its ends. All other elements are stepped one by one.
 double operations(const Program& program, const Chains& form, const Workload& load) {
-  const std::size_t lanes = lanes_to_fold(form, load.isa, load.is_double ? 8 : 4);
-  double count = 24.0;
-  for (const Chain& chain : form.chains) {
-    const double packs = std::ceil(chain.count / static_cast<double>(lanes));
-    count += 8.0 + 3.0 * packs + (chain.is_stiff ? 96.0 + 5.0 * packs : 0.0);
+  const FoldedBy by = fold_by(program, form, load.isa, load.is_double ? 8 : 4);
+  double count = 0.0;
+  if (by.short_packs > 0) {
+    count += 20.0 + 3.0 * static_cast<double>(by.short_packs);
+  } else {
+    count += 24.0;
+    for (const Chain& chain : form.chains) {
+      const double packs = std::ceil(chain.count / static_cast<double>(by.lanes));
+      count += 8.0 + 3.0 * packs + (chain.is_stiff ? 96.0 + 5.0 * packs : 0.0);
+    }
+    const double bytes = 2.0 * bytes_of_number(load) * static_cast<double>(form.nodes.size());
+    count += 1.5 * lines_of(bytes) + 6.0 * far_lines_of(bytes);
   }
-  const double bytes = 2.0 * bytes_of_number(load) * static_cast<double>(form.nodes.size());
-  count += 1.5 * lines_of(bytes) + 6.0 * far_lines_of(bytes);
   count += form.links.empty() ? 0.0 : 16.0;
   for (const std::uint32_t link : form.links) {
     const auto run =

@@ -56,8 +56,15 @@ inline constexpr std::uint32_t least_chain_masses = 8;  // Shorter chains are no
 // thread but audio]
 std::optional<Chains> chains_form(const Program& program, const Progress& progress = {});
 
-// Returns the pack width.
-std::size_t lanes_to_fold(const Chains& form, Isa isa, std::size_t number_bytes);
+// Returns whether the node is a ground, which never moves. [any thread]
+bool is_fixed_ground(const Program& program, std::uint32_t node);
+
+// The pack width, and the number of packs of a chain that stays in registers; 0: none.
+struct FoldedBy {
+  std::size_t lanes = 0;
+  std::size_t short_packs = 0;
+};
+FoldedBy fold_by(const Program& program, const Chains& form, Isa isa, std::size_t number_bytes);
 
 // Functions for the registry's row; memory is per voice, in bytes.
 double operations(const Program& program, const Chains& form, const Workload& load);

@@ -317,7 +317,8 @@ TEST_CASE("elements beside a string act on it", "[chains]") {
   }
 }
 
-// Neighbours are in the same pack or in different packs.
+// One string between a position input and a ground stays in registers. Neighbours are in the same
+// pack or in different packs.
 TEST_CASE("elements beside a short string act on it", "[chains]") {
   for (const int count : {9, 31, 32, 77, 160}) {
     CAPTURE(count);
