@@ -105,8 +105,10 @@ void OversampledKernel<T>::refine_coefficients() {
       const T value = this->coefficients.value[c * width + lane];
       fine_->coefficients.value[c * width + lane] = value * factor_[c];
       if (coarse_) {
-        coarse_->coefficients.value[c * width + lane] =
-            is_stiffness_[c] && is_coarse(lane) ? value * warp_[lane] : value;
+        // A lane of the coarse kernel without a voice stays stable, too.
+        coarse_->coefficients.value[c * width + lane] = !is_coarse(lane)   ? value * factor_[c]
+                                                        : is_stiffness_[c] ? value * warp_[lane]
+                                                                           : value;
       }
     }
   }
