@@ -24,9 +24,9 @@ struct CompileOptions {
   int voices = 0;         // replaces the preset's number; 0: the preset's
   NoteShare::Part share;  // share of the notes that this engine plays
   Precision precision = Precision::float64;
-  std::optional<Method> method;  // replaces the plan's choice
-  std::optional<Budget> budget;  // replaces the preset's
-  Isa isa = best_isa();          // no wider than the machine's
+  std::optional<Method> method;              // replaces the plan's choice
+  std::optional<Budget> budget;              // replaces the preset's
+  Isa isa = best_isa();                      // no wider than the machine's
   std::uint32_t most_modes = patient_modes;  // masses of a part up to which modes are computed
   // measurements for the plan; null: the same forms on every machine
   const Timings* timings = nullptr;

@@ -8,9 +8,9 @@
 namespace ressort::engine {
 namespace {
 
-constexpr double steal_fade_s = 0.005;  // fade of a stolen voice
-constexpr double level_memory_s = 0.1;  // release time constant of a voice's level
-constexpr double quiet_s = 0.5;         // longer than half a period of the lowest sound
+constexpr double steal_fade_s = 0.005;   // fade of a stolen voice
+constexpr double level_memory_s = 0.1;   // release time constant of a voice's level
+constexpr double quiet_s = 0.5;          // longer than half a period of the lowest sound
 constexpr double damper_on_s = 0.005;    // time constant with which a damper engages
 constexpr double inaudible_gain = 1e-6;  // a damped voice below this gain ends
 

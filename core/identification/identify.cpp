@@ -18,7 +18,7 @@ constexpr double band_hz = 690.0;  // Rate of the bands in the first search.
 constexpr double twin = 0.15;  // Poles closer than this share of their damping are the same pole.
 // Least squared amplitude over twice its variance; noise reaches this with a probability of e^-21.
 constexpr double chance = 21.0;
-constexpr double deepest_db = -110.0;     // Modes this far below the strongest one are dropped.
+constexpr double deepest_db = -110.0;      // Modes this far below the strongest one are dropped.
 constexpr std::size_t least_fitted = 150;  // Number of modes that are fitted at once if found.
 // Modes that leave less than this share of the energy are not those of noise.
 constexpr double most_of_noise = 0.8;
@@ -333,9 +333,8 @@ class Search {
         // A peak that is not exactly a damped sinusoid leaves a large residual around it, but it is
         // still a peak. Any other mode near it must exceed that residual.
         const bool is_peak =
-            std::none_of(neighbours[k].begin(), neighbours[k].end(), [&](std::size_t j) {
-              return drops[j] > drops[k] && drops[j] < HUGE_VAL;
-            });
+            std::none_of(neighbours[k].begin(), neighbours[k].end(),
+                         [&](std::size_t j) { return drops[j] > drops[k] && drops[j] < HUGE_VAL; });
         const double likelihood =
             drops[k] < least_drop ? 0.0 : 0.5 * drops[k] / (is_peak ? floor[k] : variance[k]);
         if (!(likelihood >= least) && drops[k] < HUGE_VAL) {
@@ -643,8 +642,8 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
     for (Found& found : all_found(search->fit())) {
       all.push_back(fate_of(found, rate_hz, frames, must_be_known));
       extrapolate_back(found, skipped);
-      all.back() = all.back() == Fate::kept && is_too_loud(found, blow->peak) ? Fate::unfit
-                                                                              : all.back();
+      all.back() =
+          all.back() == Fate::kept && is_too_loud(found, blow->peak) ? Fate::unfit : all.back();
     }
     return all;
   };

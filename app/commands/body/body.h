@@ -20,8 +20,8 @@ struct BodyOptions {
   bool force = false;   // overwrites existing files
   bool as_json = false;
   std::optional<std::size_t> modes;  // all that stand above the noise if not given
-  double floor_db = -70.0;  // energy of the weakest mode, relative to the strongest
-  double mass = 40.0;       // mass of every mode
+  double floor_db = -70.0;           // energy of the weakest mode, relative to the strongest
+  double mass = 40.0;                // mass of every mode
 };
 
 // Options for models.

@@ -5,8 +5,8 @@
 //
 // A form with a coarse Program takes several steps for the sake of high keys. A voice whose
 // stiffness is stable at one step a sample takes one, from its start until it is bent beyond that.
-// Its stiffness is multiplied by VoicePitch::warp, because one step of symplectic Euler plays a mode
-// higher than several do.
+// Its stiffness is multiplied by VoicePitch::warp, because one step of symplectic Euler plays a
+// mode higher than several do.
 #pragma once
 
 #include "core/kernels/kernel.h"

@@ -246,14 +246,16 @@ TEST_CASE("a felt that lies on a string damps each partial by its motion there",
   const std::vector<double> sound = with_felt(felt);
   for (int n = 1; n <= 6; ++n) {
     const double fall = std::log(level_at(sound, 44100.0, n * 220.0, 0.1, 0.1) /
-                                 level_at(sound, 44100.0, n * 220.0, 0.5, 0.1)) / 0.4;
+                                 level_at(sound, 44100.0, n * 220.0, 0.5, 0.1)) /
+                        0.4;
     INFO(n);
-    CHECK(fall == Approx(loss + 44100.0 * felt / mass * std::pow(std::sin(0.2 * n * pi), 2))
-                      .margin(0.02));
+    CHECK(fall ==
+          Approx(loss + 44100.0 * felt / mass * std::pow(std::sin(0.2 * n * pi), 2)).margin(0.02));
   }
   const std::vector<double> hard = with_felt(1e3);
-  CHECK(level_at(hard, 44100.0, 5.0 * 220.0, 0.5, 0.1) ==
-        Approx(level_at(hard, 44100.0, 5.0 * 220.0, 0.1, 0.1) * std::exp(-0.4 * loss)).epsilon(0.02));
+  CHECK(
+      level_at(hard, 44100.0, 5.0 * 220.0, 0.5, 0.1) ==
+      Approx(level_at(hard, 44100.0, 5.0 * 220.0, 0.1, 0.1) * std::exp(-0.4 * loss)).epsilon(0.02));
 }
 
 TEST_CASE("a hammer on coupled strings never gains energy", "[modal_string]") {

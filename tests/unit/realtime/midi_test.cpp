@@ -171,7 +171,8 @@ TEST_CASE("tuning messages are read, in one packet or several", "[midi]") {
     check_event(dump[61], EventKind::key_tuning, 0, 62, tuned_hz(62, 64 * 128 + 3));
     CHECK(dump[60].value2 == 0.0);
   }
-  for (const std::uint8_t kind : Bytes{0x7e, 0x7f}) {  // for new notes only, or for sounding notes too
+  for (const std::uint8_t kind :
+       Bytes{0x7e, 0x7f}) {  // for new notes only, or for sounding notes too
     const auto one = read(reader, {0xf0, kind, 0, 8, 7, 1, 2, 1, 60, 61, 64, 0, 0xf7});
     REQUIRE(one.size() == 1);
     check_event(one[0], EventKind::key_tuning, 0, 60, tuned_hz(61, 8192));
