@@ -106,9 +106,10 @@ class Chooser {
     }
     may_gain_ = eigenvectors_of_ > most_modes_ && eigenvectors_of_ <= patient_modes;
     const std::uint32_t times = steps_to_reach();
-    const bool is_accurate = meter_ == nullptr || sum_of(meter_->of(Form()), spent_).meets(budget_);
     if (program_.modes.empty() && times <= most_steps_to_reach && !may_gain_) {
-      add_steps(times, load_at_steps(), {}, times > 1 && is_accurate);
+      const bool is_by_key =
+          times > 1 && (meter_ == nullptr || sum_of(meter_->of(Form()), spent_).meets(budget_));
+      add_steps(times, load_at_steps(), {}, is_by_key);
     }
     if (candidates_.empty() && has_free_modes(program_)) {
       consider_identical();

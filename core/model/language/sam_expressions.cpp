@@ -163,24 +163,24 @@ SamLines::Value SamLines::list(Cursor& at) {
   return all;
 }
 
-SamLines::Value SamLines::sum(Cursor& at) {
-  Value all = product(at);
-  while (all && (at.starts("+") || at.starts("-"))) {
+// Reads operands with one of two signs between them, from left to right.
+SamLines::Value SamLines::joined(Cursor& at, const char* one, const char* other,
+                                 Value (SamLines::*operand)(Cursor&)) {
+  Value all = (this->*operand)(at);
+  while (all && (at.starts(one) || at.starts(other))) {
     const Token sign{at.rest.text.substr(0, 1), at.rest.column};
     at.skip(1);
-    all = combined(at, sign, all, product(at));
+    all = combined(at, sign, all, (this->*operand)(at));
   }
   return all;
 }
 
+SamLines::Value SamLines::sum(Cursor& at) {
+  return joined(at, "+", "-", &SamLines::product);
+}
+
 SamLines::Value SamLines::product(Cursor& at) {
-  Value all = power(at);
-  while (all && (at.starts("*") || at.starts("/"))) {
-    const Token sign{at.rest.text.substr(0, 1), at.rest.column};
-    at.skip(1);
-    all = combined(at, sign, all, power(at));
-  }
-  return all;
+  return joined(at, "*", "/", &SamLines::power);
 }
 
 SamLines::Value SamLines::power(Cursor& at) {

@@ -108,6 +108,7 @@ class SamLines {
   void define_parameters();
   Value chain(Cursor& at, bool in_list = true);
   Value list(Cursor& at);
+  Value joined(Cursor& at, const char* one, const char* other, Value (SamLines::*operand)(Cursor&));
   Value sum(Cursor& at);
   Value product(Cursor& at);
   Value power(Cursor& at);
