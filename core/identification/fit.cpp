@@ -168,21 +168,17 @@ bool DampedFit::set_poles(const std::vector<Complex>& log_z) {
   constant_.assign(channels, 0.0);
   find_rest();
   const Normal normal(modes_, channels, sound_[0].size(), false);
-  // The second round is one step of iterative refinement: it removes the rounding error of the
-  // first.
-  for (int round = 0; round < 1; ++round) {
-    for (std::size_t c = 0; c < channels; ++c) {
-      const auto step = positive_solution(normal.linear, Gradient(rest_[c], modes_, c).linear);
-      if (!step) {
-        return false;
-      }
-      for (std::size_t k = 0; k < modes_.size(); ++k) {
-        modes_[k].c[c] += Complex((*step)(2 * k, 0), (*step)(2 * k + 1, 0));
-      }
-      constant_[c] += (*step)(2 * modes_.size(), 0);
+  for (std::size_t c = 0; c < channels; ++c) {
+    const auto step = positive_solution(normal.linear, Gradient(rest_[c], modes_, c).linear);
+    if (!step) {
+      return false;
     }
-    find_rest();
+    for (std::size_t k = 0; k < modes_.size(); ++k) {
+      modes_[k].c[c] = Complex((*step)(2 * k, 0), (*step)(2 * k + 1, 0));
+    }
+    constant_[c] = (*step)(2 * modes_.size(), 0);
   }
+  find_rest();
   return true;
 }
 

@@ -92,7 +92,6 @@ std::vector<NoiseBand> noise_bands(const Identification& found) {
     }
     // The energy of an exponential decay is centred at 1 / (2 alpha).
     const double centre_s = moment / energy * static_cast<double>(frame) / found.rate_hz;
-    band.rise_s = static_cast<double>(loudest * frame) / found.rate_hz;
     band.t60_s = std::log(1000.0) * 2.0 * centre_s;
     for (const double sum : of_channel) {
       band.level.push_back(std::sqrt(sum / (centre_s * found.rate_hz)));

@@ -7,12 +7,11 @@
 
 namespace ressort::identification {
 
-// Noise in one band that rises for a moment and then decays exponentially.
+// Noise in one band that decays exponentially.
 struct NoiseBand {
   double low_hz = 0.0;
   double high_hz = 0.0;
-  double rise_s = 0.0;        // Time from the start of the sound to the loudest moment.
-  double t60_s = 0.0;         // Decay after that.
+  double t60_s = 0.0;         // Decay from its loudest moment on.
   std::vector<double> level;  // [channel] Rms at the start of the decay.
 };
 

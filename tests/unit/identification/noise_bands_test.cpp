@@ -22,10 +22,10 @@ TEST_CASE("Bands have the level and the decay of the noise", "[noise_bands]") {
   const NoiseBand& band = bands[3];
   CHECK(band.low_hz == 1500.0);
   CHECK(band.high_hz == 5000.0);
-  // 3500 Hz for 30 ms are about 200 independent values: 10 % deviation of each figure.
-  CHECK(band.t60_s == Approx(0.2).epsilon(0.3));
-  CHECK(band.level[0] == Approx(0.1 * std::sqrt(3500.0 / 22050.0)).epsilon(0.3));
-  CHECK(band.rise_s < 0.015);
+  // 3500 Hz for 30 ms are about 200 independent values, which deviate by 10 %; twice that is
+  // allowed.
+  CHECK(band.t60_s == Approx(0.2).epsilon(0.2));
+  CHECK(band.level[0] == Approx(0.1 * std::sqrt(3500.0 / 22050.0)).epsilon(0.2));
 }
 
 TEST_CASE("Bands without noise are left out", "[noise_bands]") {
