@@ -117,6 +117,11 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
           },
           "OSC port, or off (default 9777)")
       ->type_name("PORT");
+  command
+      ->add_option("--osc-reply", options.osc.reply_port,
+                   "port that gets the replies to OSC, for tablets (default: the sender's)")
+      ->type_name("PORT")
+      ->check(within(1, 65535));
   command->add_option("-B,--osc-bind", options.osc.bind_address, "address for OSC to listen at")
       ->type_name("ADDRESS")
       ->capture_default_str();

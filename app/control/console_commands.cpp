@@ -206,6 +206,16 @@ Result<Done> command::load(ConsoleContext& console, Words words) {
   return Done{};
 }
 
+Result<Done> command::next_preset(ConsoleContext& console, Words) {
+  const std::string name = console.session.preset_beside(1);
+  return command::load(console, {&name, 1});
+}
+
+Result<Done> command::previous_preset(ConsoleContext& console, Words) {
+  const std::string name = console.session.preset_beside(-1);
+  return command::load(console, {&name, 1});
+}
+
 namespace {
 
 std::string preset_table() {

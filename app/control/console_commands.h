@@ -44,6 +44,8 @@ Result<std::vector<TimbreTarget>> timbre_targets(std::span<const Argument> argum
 namespace command {
 Result<Done> keys(ConsoleContext& console, Words words);
 Result<Done> load(ConsoleContext& console, Words words);
+Result<Done> next_preset(ConsoleContext& console, Words words);
+Result<Done> previous_preset(ConsoleContext& console, Words words);
 Result<Done> models(ConsoleContext& console, Words words);
 Result<Done> presets(ConsoleContext& console, Words words);
 Result<Done> save(ConsoleContext& console, Words words);

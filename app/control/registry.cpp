@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <set>
 
 #include "app/control/rows.h"
 #include "app/text.h"
@@ -200,6 +201,50 @@ FoundRow find_row(std::string_view address) {
     }
   }
   return found;
+}
+
+std::vector<std::string> addresses_meant(const std::string& pattern, const Instrument& instrument) {
+  if (pattern.find_first_of("*?[{") == pattern.npos) {
+    return {pattern};
+  }
+  std::set<std::string> found;
+  const auto try_address = [&](const std::string& address) {
+    if (fits(pattern, address)) {
+      found.insert(address);
+    }
+  };
+  // A name may itself be a pattern: the rest of the address must match.
+  const auto try_name = [&](std::string_view before, std::string_view after) {
+    std::size_t at = 0;  // where the name begins in the pattern
+    for (auto slashes = std::count(before.begin(), before.end(), '/'); slashes > 0; --slashes) {
+      at = std::min(pattern.find('/', at), pattern.size() - 1) + 1;
+    }
+    const std::size_t size = std::min(pattern.find('/', at), pattern.size()) - at;
+    const auto with = [&](std::string_view name, std::string_view start, std::string_view end) {
+      return std::string(start) + std::string(name) + std::string(end);
+    };
+    const std::string_view all = pattern;
+    if (size > 0 &&
+        fits(with("x", all.substr(0, at), all.substr(at + size)), with("x", before, after))) {
+      found.insert(with(all.substr(at, size), before, after));
+    }
+  };
+  for (const Row& row : rows()) {
+    const auto [before, hole, after] = pattern_of(row);
+    if (hole == "N") {
+      for (const InputInfo& input : instrument.inputs) {
+        try_address(std::string(before) + std::to_string(input.number) + std::string(after));
+      }
+    } else if (hole == "NAME") {
+      try_name(before, after);
+    } else if (!before.empty()) {
+      try_address(row.address);
+    }
+  }
+  for (const CustomInfo& info : instrument.custom) {
+    try_address(info.address);
+  }
+  return found.empty() ? std::vector{pattern} : std::vector(found.begin(), found.end());
 }
 
 bool is_answer(std::string_view address) {

@@ -96,6 +96,11 @@ struct FoundRow {
 };
 FoundRow find_row(std::string_view address);
 
+// Returns the addresses that an OSC pattern means: the built-in ones, and those of the preset's
+// controls. A name of a mass or parameter stays a pattern, which its row resolves. Returns the
+// address itself if it has no pattern, or if nothing matches.
+std::vector<std::string> addresses_meant(const std::string& pattern, const Instrument& instrument);
+
 // Returns whether an address is a built-in address or a reply, so that a preset must not use it for
 // a control.
 bool is_reserved(std::string_view address);

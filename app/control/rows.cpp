@@ -129,6 +129,13 @@ constexpr CallArgument own_id{.word = "ID",
                               .most = most_note_ids,
                               .otherwise = 0,
                               .is_whole = true};
+// The optional port of a receiver; without it, the sender's.
+constexpr CallArgument port{.word = "PORT",
+                            .meaning = "the port",
+                            .least = 1,
+                            .most = 65535,
+                            .otherwise = 0,
+                            .is_whole = true};
 
 // --- the table -----------------------------------------------------------------------------------
 
@@ -317,6 +324,22 @@ std::vector<Row> make_rows() {
        .command_does = "loads a preset; Tab completes presets only",
        .details = "A preset is a model with parameter ranges and controls.",
        .act = command::load},
+      {.address = "/preset/next",
+       .does =
+           "loads the next preset of the list; ignores a button's value; replies /done or /fail",
+       .answer = answer::next_preset,
+       .command = "next",
+       .group = CommandGroup::models,
+       .command_does = "loads the next preset of the list",
+       .act = command::next_preset},
+      {.address = "/preset/previous",
+       .does = "loads the previous preset of the list; ignores a button's value; replies /done or "
+               "/fail",
+       .answer = answer::previous_preset,
+       .command = "previous",
+       .group = CommandGroup::models,
+       .command_does = "loads the previous preset of the list",
+       .act = command::previous_preset},
       {.address = "/preset/save",
        .arguments = {{.word = "NAME", .is_text = true}},
        .does = "saves the current sound as a user preset; never overwrites; replies /done or /fail",
@@ -364,10 +387,10 @@ std::vector<Row> make_rows() {
                   "parameters at the pitch\nwritten in the model.",
        .act = command::modes},
       {.address = "/timbre",
-       .arguments = {{"SECONDS", "the seconds", 0, Subscribers::longest_lease_s, 10}},
+       .arguments = {{"SECONDS", "the seconds", 0, Subscribers::longest_lease_s, 10}, port},
        .does =
            "sends descriptors of the sound as /timbre.frame, 94 times a second, for SECONDS, at "
-           "most 60 (10); repeat it to renew",
+           "most 60 (10), to PORT (the sender's); repeat it to renew",
        .answer = answer::timbre,
        .command = "timbre",
        .group = CommandGroup::looking,
@@ -407,12 +430,13 @@ std::vector<Row> make_rows() {
            "NAME' saves it, 'timbre' describes the sound.",
        .act = command::shape},
       {.address = "/subscribe",
-       .arguments = {{"SECONDS", "the seconds", 0, Subscribers::longest_lease_s, 10}},
+       .arguments = {{"SECONDS", "the seconds", 0, Subscribers::longest_lease_s, 10}, port},
        .does =
            "sends the current state, then every change as /loaded and /param/NAME, for SECONDS, "
-           "at most 60 (10); repeat it to renew",
+           "at most 60 (10), to PORT (the sender's); repeat it to renew",
        .answer = answer::subscribe},
       {.address = "/unsubscribe",
+       .arguments = {port},
        .does = "ends the subscriptions of /subscribe and /timbre",
        .answer = answer::unsubscribe},
       {.address = "/models",
@@ -464,7 +488,7 @@ std::vector<Row> make_rows() {
   };
   rows.insert(rows.end(), std::begin(last), std::end(last));
   for (Row& row : rows) {
-    if (row.words.empty()) {
+    if (row.words.empty() && row.act == nullptr) {
       row.words = row.arguments_text();
     }
     if (row.command_does.empty()) {

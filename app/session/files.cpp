@@ -285,6 +285,18 @@ std::vector<std::string> known_presets() {
 std::vector<std::string> known_models() {
   return names_in("models", ".mdl");
 }
+
+std::string preset_beside(const std::string& name, int step) {
+  const std::vector<std::string> presets = known_presets();
+  if (presets.empty()) {
+    return "";
+  }
+  const auto found = std::find(presets.begin(), presets.end(), in_any_case(name, presets));
+  const int count = static_cast<int>(presets.size());
+  const int at =
+      found != presets.end() ? static_cast<int>(found - presets.begin()) : (step > 0 ? -1 : count);
+  return presets[static_cast<std::size_t>(((at + step) % count + count) % count)];
+}
 std::string preset_path(const std::string& name) {
   return known_path("presets", name + ".toml");
 }

@@ -41,6 +41,10 @@ std::optional<std::string> own_file(const std::string& path);
 std::vector<std::string> known_presets();
 std::vector<std::string> known_models();
 
+// Returns the preset that is `step` places after this name in the list of presets, in which the
+// first follows the last: any other name lies between the two. Empty if there are no presets.
+std::string preset_beside(const std::string& name, int step);
+
 // Return the file of a preset or model with exactly this name, or an empty string.
 std::string preset_path(const std::string& name);
 std::string model_path(const std::string& name);

@@ -57,6 +57,10 @@ void Session::load(std::string name, Answer answer, bool force, Reach reach) {
   queue_.add(LoadJob{{.name = std::move(name), .force = force, .reach = reach}, std::move(answer)});
 }
 
+std::string Session::preset_beside(int step) const {
+  return session::preset_beside(queue_.newest_load(), step);
+}
+
 Result<std::shared_ptr<const Loaded>> Session::load_and_wait(const std::string& name, bool force) {
   std::promise<Result<std::shared_ptr<const Loaded>>> promise;
   load(

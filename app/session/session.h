@@ -71,6 +71,9 @@ class Session {
   using ShapeAnswer = std::function<void(const Result<Shaped>&)>;
   void shape(std::vector<TimbreTarget> targets, ShapeAnswer answer);
 
+  // The preset after the one that was asked for last, with a step of 1, or before it, with -1.
+  std::string preset_beside(int step) const;
+
   // Compiles the playing scene again for the backend's new rate.
   void set_rate(double rate_hz) { queue_.set_rate(rate_hz); }
 

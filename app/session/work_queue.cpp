@@ -8,6 +8,7 @@ void WorkQueue::add(LoadJob job) {
   {
     const std::lock_guard lock(mutex_);
     if (!is_ending_) {
+      newest_load_ = job.request.name;
       loads_.push_back(std::move(job));
       wake_.notify_all();
       return;
@@ -42,6 +43,11 @@ void WorkQueue::set_rate(double rate_hz) {
 double WorkQueue::rate_hz() const {
   const std::lock_guard lock(mutex_);
   return rate_hz_;
+}
+
+std::string WorkQueue::newest_load() const {
+  const std::lock_guard lock(mutex_);
+  return newest_load_;
 }
 
 void WorkQueue::end() {

@@ -50,6 +50,8 @@ class WorkQueue {
   void add(Inquiry inquiry);
   void set_rate(double rate_hz);
   double rate_hz() const;
+  // The name of the scene that was asked for last, loaded or not; empty before the first.
+  std::string newest_load() const;
   void end();
   // Returns true after this time, or false as soon as the program ends.
   bool wait(std::chrono::duration<double> time);
@@ -81,6 +83,7 @@ class WorkQueue {
   mutable std::mutex mutex_;  // guards all below
   std::condition_variable wake_;
   std::deque<LoadJob> loads_;
+  std::string newest_load_;
   std::deque<Inquiry> inquiries_;
   bool is_ending_ = false;
   double rate_hz_;        // rate of the backend

@@ -1,5 +1,6 @@
 #include "app/control/osc/answers.h"
 
+#include <cmath>
 #include <set>
 
 #include "app/control/console_commands.h"
@@ -37,24 +38,80 @@ void answer_parameters(const Query& query, MakeRow&& make_row) {
   }
 }
 
+// Returns the client at the PORT in this argument, or the sender if there is none; sends an error
+// and returns nothing if it is not a port.
+std::optional<OscClient> receiver(const Query& query, std::size_t argument) {
+  if (query.message.arguments.size() <= argument) {
+    return query.client;
+  }
+  const double* const port = std::get_if<double>(&query.message.arguments[argument]);
+  if (port == nullptr || !(*port >= 1.0 && *port <= 65535.0) || *port != std::floor(*port)) {
+    query.client.error(query.message.address, "expected PORT, a whole number from 1 to 65535");
+    return std::nullopt;
+  }
+  return query.client.at_port(static_cast<std::uint16_t>(*port));
+}
+
 // Returns the length of a subscription in seconds, from now; sends an error and returns nothing if
 // it is invalid.
 std::optional<double> lease(const Query& query, Subscribers::News news, std::string_view reply) {
   constexpr double usual_s = 10.0;
   const auto& arguments = query.message.arguments;
   const double* const asked = arguments.empty() ? &usual_s : std::get_if<double>(arguments.data());
-  if (asked == nullptr || arguments.size() > 1 ||
+  if (asked == nullptr || arguments.size() > 2 ||
       !(*asked > 0.0 && *asked <= Subscribers::longest_lease_s)) {
     query.client.error(query.message.address, "expected SECONDS, above 0 and at most " +
-                                                  print_number(Subscribers::longest_lease_s));
+                                                  print_number(Subscribers::longest_lease_s) +
+                                                  ", and a PORT or nothing");
     return std::nullopt;
   }
-  if (auto added = query.subscribers.add(query.client, news, *asked, monotonic_ns()); !added) {
+  const auto client = receiver(query, 1);
+  if (!client) {
+    return std::nullopt;
+  }
+  if (auto added = query.subscribers.add(*client, news, *asked, monotonic_ns()); !added) {
     query.client.error(query.message.address, added.error().message);
     return std::nullopt;
   }
-  query.client.answer(Reply(reply).real(*asked));
+  client->answer(Reply(reply).real(*asked));
   return *asked;
+}
+
+// Loads a scene and replies /done or /fail with the address and `told`.
+void load_named(const Query& query, const std::string& name, std::optional<Argument> told) {
+  const OscClient& client = query.client;
+  const std::string& address = query.message.address;
+  if (!client.outlet().begin_load()) {
+    client.error(address, "busy: too many loads are waiting; try again");
+    return;
+  }
+  const auto answer = [address, client, told](const Result<std::shared_ptr<const Loaded>>& result) {
+    client.outlet().end_load();
+    Reply reply(result ? "/done" : "/fail");
+    reply.text(address);
+    if (told) {
+      reply.argument(*told);
+    }
+    if (!result) {
+      const std::string& full = result.error().message;
+      const std::string reason = without_source(full);
+      reply.text(reason);
+      if (reason != full) {
+        client.outlet().log_failure("OSC could not load it:\n" + full);
+      }
+    }
+    client.answer(reply);
+  };
+  query.session.load(name, answer, false, Reach::own_folders);
+}
+
+void load_beside(const Query& query, int step) {
+  const std::string name = query.session.preset_beside(step);
+  if (name.empty()) {
+    query.client.error(query.message.address, "there are no presets");
+    return;
+  }
+  load_named(query, name, Argument(name));
 }
 
 }  // namespace
@@ -80,35 +137,21 @@ void answer::ranges(const Query& query) {
 
 void answer::load(const Query& query) {
   const Message& message = query.message;
-  const OscClient& client = query.client;
   if (message.arguments.empty() || message.arguments.size() > 2 ||
       !std::holds_alternative<std::string>(message.arguments[0])) {
-    client.error(message.address, message.address + ": expected NAME [ID]");
+    query.client.error(message.address, message.address + ": expected NAME [ID]");
     return;
   }
-  if (!client.outlet().begin_load()) {
-    client.error(message.address, "busy: too many loads are waiting; try again");
-    return;
-  }
-  const auto answer = [message, client](const Result<std::shared_ptr<const Loaded>>& result) {
-    client.outlet().end_load();
-    Reply reply(result ? "/done" : "/fail");
-    reply.text(message.address);
-    if (message.arguments.size() > 1) {
-      reply.argument(message.arguments[1]);
-    }
-    if (!result) {
-      const std::string& full = result.error().message;
-      const std::string reason = without_source(full);
-      reply.text(reason);
-      if (reason != full) {
-        client.outlet().log_failure("OSC could not load it:\n" + full);
-      }
-    }
-    client.answer(reply);
-  };
-  query.session.load(std::get<std::string>(message.arguments[0]), answer, false,
-                     Reach::own_folders);
+  load_named(query, std::get<std::string>(message.arguments[0]),
+             message.arguments.size() > 1 ? std::optional(message.arguments[1]) : std::nullopt);
+}
+
+void answer::next_preset(const Query& query) {
+  load_beside(query, 1);
+}
+
+void answer::previous_preset(const Query& query) {
+  load_beside(query, -1);
 }
 
 // Never overwrites: the sender of a packet has not seen what is there.
@@ -296,8 +339,12 @@ void answer::timbre(const Query& query) {
 }
 
 void answer::unsubscribe(const Query& query) {
-  if (query.subscribers.remove(query.client)) {
-    query.client.answer(Reply("/done").text(query.message.address));
+  const auto client = receiver(query, 0);
+  if (!client) {
+    return;
+  }
+  if (query.subscribers.remove(*client)) {
+    client->answer(Reply("/done").text(query.message.address));
   } else {
     query.client.error(query.message.address, "there was no subscription");
   }

@@ -14,6 +14,8 @@ void ranges(const Query& query);
 
 // Reply /done s:address [ID], or /fail s:address [ID] s:reason, later from the session's worker.
 void load(const Query& query);
+void next_preset(const Query& query);
+void previous_preset(const Query& query);
 void save(const Query& query);
 void flight(const Query& query);
 

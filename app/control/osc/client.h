@@ -20,6 +20,13 @@ class OscClient {
   OscClient(std::shared_ptr<OscOutlet> outlet, Post post)
       : outlet_(std::move(outlet)), post_(std::move(post)) {}
 
+  // Returns the same client with another port for the replies.
+  OscClient at_port(std::uint16_t port) const {
+    OscClient other = *this;
+    other.sender_.port = port;
+    return other;
+  }
+
   void answer(const Reply& reply) const;
   // Sends an error. It is also logged for the local user, rate-limited.
   void error(const std::string& about, const std::string& message) const;

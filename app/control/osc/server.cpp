@@ -60,12 +60,13 @@ struct OscServer::Server {
   };
 
   Server(Process& process_in, Session& session_in, int socket_in, int wake_in,
-         std::vector<Subnet> allowed_in, OscOutlet::Log log)
+         std::vector<Subnet> allowed_in, int reply_port_in, OscOutlet::Log log)
       : process(process_in),
         session(session_in),
         socket(socket_in),
         wake(wake_in),
         allowed(std::move(allowed_in)),
+        reply_port(reply_port_in),
         outlet(std::make_shared<OscOutlet>(socket_in, std::move(log))),
         thread([this] { run(); }) {}
 
@@ -102,7 +103,9 @@ struct OscServer::Server {
       }
       if (const auto arrived = receive_packet(socket, buffer)) {
         count_lost(arrived->lost);
-        const OscClient client{outlet, arrived->from};
+        const OscClient sender{outlet, arrived->from};
+        const OscClient client =
+            reply_port > 0 ? sender.at_port(static_cast<std::uint16_t>(reply_port)) : sender;
         if (may_send(allowed, arrived->from.address)) {
           outlet->received(arrived->from, arrived->bytes);
           receive({buffer.data(), arrived->bytes}, client);
@@ -152,6 +155,7 @@ struct OscServer::Server {
       return;
     }
     Groups groups;
+    std::vector<Message> queries;
     for (const OscMessage& message : *messages) {
       const char* const address = reinterpret_cast<const char*>(message.bytes.data());
       if (std::strlen(address) > max_address_bytes) {
@@ -161,7 +165,16 @@ struct OscServer::Server {
         continue;
       } else if (const auto said = read_message(message.bytes)) {
         // 0 is not in the standard, but some programs send it for "immediately".
-        handle(*said, std::max<std::uint64_t>(1, message.time_tag), groups, client);
+        const auto loaded = session.current();
+        for (const std::string& meant : addresses_meant(said->address, loaded->instrument)) {
+          Message one = *said;
+          one.address = meant;
+          if (is_query(one)) {
+            queries.push_back(std::move(one));
+          } else {
+            add(one, *loaded, groups[std::max<std::uint64_t>(1, message.time_tag)], client);
+          }
+        }
       } else {
         client.error(address, "arguments are numbers (i f d h T F) or texts (s S)");
       }
@@ -169,6 +182,17 @@ struct OscServer::Server {
     for (auto& [time_tag, group] : groups) {
       play(time_tag, group, client);
     }
+    // They are answered last, with the values that the bundle has set.
+    for (const Message& message : queries) {
+      const auto [row, name] = find_row(message.address);
+      row->answer({message, name, session, client, subscribers});
+    }
+  }
+
+  static bool is_query(const Message& message) {
+    const Row* const row = find_row(message.address).row;
+    return row != nullptr && row->answer != nullptr &&
+           (row->play == nullptr || message.arguments.empty());
   }
 
   // Limits replies to malformed packets, whose sender address may be forged.
@@ -181,22 +205,16 @@ struct OscServer::Server {
     return ++malformed_answers <= max_malformed_answers;
   }
 
-  // Playing messages join their group; queries are answered immediately, whatever their time tag.
-  void handle(const Message& message, std::uint64_t time_tag, Groups& groups,
-              const OscClient& client) {
-    const auto [row, name] = find_row(message.address);
-    if (row != nullptr && row->answer != nullptr &&
-        (row->play == nullptr || message.arguments.empty())) {
-      row->answer({message, name, session, client, subscribers});
-      return;
-    }
-    const auto loaded = session.current();
-    const Events events = to_events(message, loaded->instrument, loaded->serial);
+  // Adds the events of a playing message to the group of its time tag.
+  void add(const Message& message, const Loaded& loaded, Group& group, const OscClient& client) {
+    const Events events = to_events(message, loaded.instrument, loaded.serial);
     if (!events) {
       client.error(message.address, events.error().message);
       return;
     }
-    Group& group = groups.try_emplace(time_tag, Group{message.address, {}, {}}).first->second;
+    if (group.address.empty()) {
+      group.address = message.address;
+    }
     if (group.events.size() + events->size() > max_bundle_events) {
       client.error(message.address,
                    "a bundle may have at most " + std::to_string(max_bundle_events) + " events");
@@ -204,7 +222,7 @@ struct OscServer::Server {
     }
     for (const Event& event : *events) {
       group.events.push_back({.event = event});
-      if (const std::string news = describe_limit(message, event, loaded->instrument);
+      if (const std::string news = describe_limit(message, event, loaded.instrument);
           !news.empty()) {
         group.news.emplace_back(message.address, news);
       }
@@ -212,6 +230,9 @@ struct OscServer::Server {
   }
 
   void play(std::uint64_t time_tag, Group& group, const OscClient& client) {
+    if (group.events.empty()) {
+      return;
+    }
     double late_s = 0.0;
     TimedEvent timed;
     if (time_tag > 1) {
@@ -271,6 +292,7 @@ struct OscServer::Server {
   const int socket;  // Owned by the outlet, which closes it after the thread has ended.
   const int wake;
   const std::vector<Subnet> allowed;
+  const int reply_port;  // 0: the sender's.
   std::shared_ptr<OscOutlet> outlet;
   TagClock tags;
   Subscribers subscribers;
@@ -304,8 +326,8 @@ Result<std::unique_ptr<OscServer>> OscServer::open(const OscOptions& options, Pr
     close(*socket);
     return Error{"OSC cannot start: " + reason};
   }
-  return std::unique_ptr<OscServer>(new OscServer(
-      std::make_unique<Server>(process, session, *socket, wake, *allowed, std::move(log))));
+  return std::unique_ptr<OscServer>(new OscServer(std::make_unique<Server>(
+      process, session, *socket, wake, *allowed, options.reply_port, std::move(log))));
 }
 
 Result<std::unique_ptr<OscServer>> OscServer::open_without_udp(Process& process, Session& session,
@@ -314,8 +336,8 @@ Result<std::unique_ptr<OscServer>> OscServer::open_without_udp(Process& process,
   if (wake < 0) {
     return Error{"OSC cannot start: " + std::generic_category().message(errno)};
   }
-  return std::unique_ptr<OscServer>(new OscServer(
-      std::make_unique<Server>(process, session, -1, wake, std::vector<Subnet>(), std::move(log))));
+  return std::unique_ptr<OscServer>(new OscServer(std::make_unique<Server>(
+      process, session, -1, wake, std::vector<Subnet>(), 0, std::move(log))));
 }
 
 OscServer::Packets OscServer::ask(std::vector<std::uint8_t> packet,

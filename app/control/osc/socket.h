@@ -14,8 +14,9 @@ namespace ressort::control {
 
 struct OscOptions {
   std::string bind_address = "127.0.0.1";
-  int port = 9777;    // 0: any free port.
-  std::string allow;  // Remote senders that are allowed: "192.168.1.0/24,10.0.0.5".
+  int port = 9777;     // 0: any free port.
+  int reply_port = 0;  // Port of the senders that gets the replies; 0: the one they send from.
+  std::string allow;   // Remote senders that are allowed: "192.168.1.0/24,10.0.0.5".
 };
 
 // Returns the allowed senders besides this machine. If the socket is reachable from other machines

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "app/control/osc/packet.h"
+#include "app/control/osc/socket.h"
 #include "tests/support/app/osc_bytes.h"
 #include "tests/support/catch.h"
 #include "tests/support/rooms.h"
@@ -21,6 +22,10 @@ class Client {
  public:
   explicit Client(int port, std::uint32_t address = INADDR_LOOPBACK)
       : socket_(socket(AF_INET, SOCK_DGRAM, 0)) {
+    turn_to(port, address);
+  }
+  // Exchanges packets with this server from now on.
+  void turn_to(int port, std::uint32_t address = INADDR_LOOPBACK) {
     sockaddr_in server{};
     server.sin_family = AF_INET;
     server.sin_port = htons(static_cast<std::uint16_t>(port));
@@ -28,6 +33,9 @@ class Client {
     REQUIRE(connect(socket_, reinterpret_cast<const sockaddr*>(&server), sizeof server) == 0);
   }
   ~Client() { close(socket_); }
+
+  // Returns the port from which it sends.
+  int port() const { return port_of(socket_); }
 
   void send(const Bytes& bytes) {
     REQUIRE(::send(socket_, bytes.data(), bytes.size(), 0) == static_cast<ssize_t>(bytes.size()));

@@ -40,7 +40,7 @@ TEST_CASE("commands can be abbreviated to a unique prefix", "[console]") {
 }
 
 TEST_CASE("an ambiguous or unknown command lists the alternatives", "[console]") {
-  CHECK(error_of("n 60") == "'n' could be noteon or noteoff");
+  CHECK(error_of("n 60") == "'n' could be next or noteon or noteoff");
   CHECK(has(error_of("s"), "status"));
   const std::string unknown = error_of("jump");
   CHECK(has(unknown, "there is no command 'jump'"));

@@ -90,6 +90,78 @@ TEST_CASE("subscribers receive every change from any source", "[osc_subscribe]")
   CHECK(listener.ask(message("/unsubscribe")).address == "/error");
 }
 
+// A tablet sends from one port and listens at another one.
+TEST_CASE("a tablet gets changes at the port that it names", "[osc_subscribe]") {
+  OscHarness osc;
+  Client tablet(osc.server->port());
+  Client screen(osc.server->port());
+  tablet.send(message("/subscribe", {30, screen.port()}));
+  CHECK(next(screen, "/subscribe.reply").values.size() == 1);
+  CHECK(value(next(screen, "/param/m_K")) == 0.1f);
+  tablet.send(message("/param/m_K", {0.125f}));
+  CHECK(value(next(screen, "/param/m_K")) == 0.125f);
+  CHECK_FALSE(tablet.receive(100));
+  for (const int port : {0, 65536}) {
+    CHECK(tablet.ask(message("/subscribe", {30, port})).address == "/error");
+  }
+  tablet.send(message("/unsubscribe", {screen.port()}));
+  CHECK(next(screen, "/done").text(0) == "/unsubscribe");
+}
+
+TEST_CASE("all replies go to one port if the server is told so", "[osc_subscribe]") {
+  OscHarness osc;
+  Client screen(osc.server->port());
+  const auto other = OscServer::open({.port = 0, .reply_port = screen.port()}, osc.harness.process,
+                                     osc.harness.session, nullptr);
+  REQUIRE(other);
+  Client tablet((*other)->port());
+  screen.turn_to((*other)->port());
+  tablet.send(message("/param/m_K"));
+  CHECK(value(next(screen, "/param/m_K")) == 0.1f);
+  CHECK_FALSE(tablet.receive(100));
+}
+
+TEST_CASE("an OSC pattern in any part of an address means all that match", "[osc_subscribe]") {
+  OscHarness osc;
+  Client client(osc.server->port());
+  const auto triangle = osc.harness.session.current();
+  using Addresses = std::vector<std::string>;
+  const auto meant = [&](const char* pattern) {
+    return addresses_meant(pattern, triangle->instrument);
+  };
+  CHECK(meant("/note/o[nf]") == Addresses{"/note/on"});
+  CHECK(meant("/note/{on,off}") == Addresses{"/note/off", "/note/on"});
+  CHECK(meant("/par?m/[lm]_K") == Addresses{"/param/[lm]_K"});
+  CHECK(meant("/in/*/force") == Addresses{"/in/1/force"});
+  CHECK(meant("/*/1/fo*") == Addresses{"/in/1/force"});
+  CHECK(meant("/in/*/pu*") == Addresses{"/in/*/pu*"});
+  CHECK(value(client.ask(message("/p*/m_[A-K]"))) == 0.1f);
+  CHECK(client.ask(message("/no*")).address == "/error");
+}
+
+TEST_CASE("a query in a bundle answers what the bundle has set", "[osc_subscribe]") {
+  OscHarness osc;
+  Client client(osc.server->port());
+  client.send(bundle(1, {message("/param/m_K"), message("/param/m_K", {0.125f})}));
+  CHECK(value(next(client, "/param/m_K")) == 0.125f);
+}
+
+TEST_CASE("presets are loaded one after the other", "[osc_subscribe]") {
+  OscHarness osc;
+  osc.data.write("presets/zither.toml", triangle_preset);
+  Client client(osc.server->port());
+  const auto told = [&](const char* address) {
+    const Answer done = client.ask(message(address, {1.0f}));  // A button's value.
+    return done.address + " " + done.text(0) + " " + done.text(1);
+  };
+  CHECK(told("/preset/next") == "/done /preset/next zither");
+  CHECK(told("/preset/next") == "/done /preset/next tri");
+  CHECK(told("/preset/previous") == "/done /preset/previous zither");
+  CHECK(has(osc.harness.say("next"), "tri: 3 masses"));
+  CHECK(has(osc.harness.say("load triangle"), "triangle: 3 masses"));
+  CHECK(has(osc.harness.say("previous"), "zither: 3 masses"));
+}
+
 TEST_CASE("a subscription ends with its lease", "[osc_subscribe]") {
   OscHarness osc;
   Client listener(osc.server->port());
