@@ -79,7 +79,7 @@ bool Definite::factor(std::span<const double> diagonal, std::span<const double> 
               [&](int, int, double share) { values[*at++] -= weights[t] * share; });
   }
   progress_.spend(weights.size());
-  return matrix_->solver.factor(matrix_->sum, Cholesky::Pivots::positive, progress_);
+  return matrix_->solver.factor(matrix_->sum, progress_) && matrix_->solver.negative_pivots() == 0;
 }
 
 // Let A be the matrix without the moving terms. Then A - sum w g g^T is positive definite if the

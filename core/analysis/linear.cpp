@@ -266,8 +266,7 @@ class Spectrum {
     for (std::size_t k = 0; k + 1 < lower_.first.size(); ++k) {
       shifted.value[static_cast<std::size_t>(lower_.first[k])] -= shift_;
     }
-    is_factored_ = factor_.analyze(lower_, progress_) &&
-                   factor_.factor(shifted, Cholesky::Pivots::any, progress_);
+    is_factored_ = factor_.analyze(lower_, progress_) && factor_.factor(shifted, progress_);
     return is_factored_;
   }
 

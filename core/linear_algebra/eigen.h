@@ -1,5 +1,5 @@
-// core/linear_algebra: Eigen's and Spectra's functions as plain functions, so that only
-// symmetric.cpp and general.cpp include those libraries. [any thread but audio]
+// core/linear_algebra: Eigen's and Spectra's functions as plain functions, so that no
+// other room includes those libraries. [any thread but audio]
 #pragma once
 
 #include <functional>
@@ -25,10 +25,6 @@ using ShiftedInverse = std::function<void(const double* from, double* to)>;
 // shifted inverse. Empty if the iteration does not converge.
 std::optional<Eigenpairs> eigenpairs_near(double shift, int count, int size,
                                           const ShiftedInverse& inverse);
-
-// Returns a fill-reducing elimination order by approximate minimum degree: [row] its position. Only
-// the pattern is read.
-std::vector<int> order_of_elimination(const SparseMatrix& pattern);
 
 // Returns the eigenvalues of a square matrix; empty if they cannot be found. O(size^3)
 std::vector<std::complex<double>> eigenvalues(const Matrix& matrix);

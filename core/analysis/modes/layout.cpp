@@ -146,8 +146,7 @@ class LayoutMaker {
       laplacian.value[static_cast<std::size_t>(laplacian.first[k])] -= shift;
     }
     Cholesky factor;
-    if (!factor.analyze(laplacian, {}) ||
-        !factor.factor(laplacian, Cholesky::Pivots::positive, {})) {
+    if (!factor.analyze(laplacian, {}) || !factor.factor(laplacian, {})) {
       return std::nullopt;
     }
     const int count = std::min(vectors, laplacian.size() - 1);

@@ -87,7 +87,7 @@ class LowestSwings {
     for (std::size_t k = 0; k < size_; ++k) {
       shifted.value[static_cast<std::size_t>(stiffness_.first[k])] -= shift;
     }
-    return factor.factor(shifted, Cholesky::Pivots::any, progress_);
+    return factor.factor(shifted, progress_);
   }
 
   Vector given(Vector vector) const {
@@ -173,9 +173,9 @@ class LowestSwings {
     if (place == 0) {
       return 0;
     }
-    Cholesky counter = factor_;
+    Cholesky counter;
     const double between = 0.5 * (values[place] + values[place - 1]);
-    if (!factored(counter, between)) {
+    if (!counter.analyze(stiffness_, progress_) || !factored(counter, between)) {
       return 0;
     }
     const std::size_t there = counter.negative_pivots();
