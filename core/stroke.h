@@ -74,6 +74,7 @@ struct Stroke {
   double rate_hz = 44100.0;
   double pitch = 1.0;  // the voice's pitch by the written pitch; 1 unless the control follows it
   double share = 1.0;  // factor on the force of a blow
+  double hardness = 0.0;  // added to the amount for the length of a blow
   bool bare = false;   // nothing is smoothed
   std::uint64_t seed = 0;  // differs from note to note and from input to input
   // Results, set by the gesture.
@@ -99,16 +100,17 @@ struct Stroke {
     return std::pow(10.0, db / 20.0) * loudness.value_or(1.0);
   }
   // Returns the duration of the gesture. It shrinks in equal ratios from soft to hard.
-  double length_s() const {
+  double length_s(double harder = 0.0) const {
     const double longest_s = settings.longest_s;
     const double shortest_s = settings.shortest_s;
-    const double a = std::clamp(amount, 0.0, 1.0);
-    return longest_s > 0.0 && shortest_s > 0.0 ? longest_s * std::pow(shortest_s / longest_s, a)
-                                               : longest_s + (shortest_s - longest_s) * a;
+    const double a = std::clamp(amount, 0.0, 1.0) + harder;
+    return longest_s > 0.0 && shortest_s > 0.0
+               ? longest_s * std::pow(shortest_s / longest_s, a)
+               : std::max(0.0, longest_s + (shortest_s - longest_s) * a);
   }
   // Returns the duration of a blow. If the control follows the pitch, it shrinks in proportion to
   // the period of a higher key, so that all keys have the same timbre.
-  double pulse_frames() const { return length_s() * rate_hz / pitch; }
+  double pulse_frames() const { return length_s(hardness) * rate_hz / pitch; }
   // Returns the share of a burst's level that remains after one sample.
   double burst_kept() const { return std::pow(10.0, -3.0 / (length_s() * rate_hz)); }
   BandNoise noise() const { return {seed, settings.low_hz, settings.high_hz, rate_hz}; }

@@ -290,11 +290,18 @@ std::vector<std::string> Console::completions(std::string_view line) const {
     for (const Row* const row : command_rows()) {
       words.emplace_back(row->command);
     }
-  } else if (kind.find("PARAMETER") != kind.npos) {
+  } else if (kind.find("PARAMETER") != kind.npos || kind.find("CONTROL") != kind.npos) {
     const auto loaded =
         context_->session.current();  // Keeps the current scene alive while the worker replaces it.
     for (const ParameterInfo& info : loaded->instrument.parameters) {
-      words.push_back(info.name);
+      if (kind.find("PARAMETER") != kind.npos) {
+        words.push_back(info.name);
+      }
+    }
+    for (const KnobInfo& knob : loaded->instrument.knobs) {
+      if (kind.find("CONTROL") != kind.npos) {
+        words.push_back(knob.word);
+      }
     }
   } else if (kind == "MASS") {
     const auto loaded = context_->session.current();

@@ -244,6 +244,34 @@ Result<Done> command::presets(ConsoleContext& console, Words) {
   return Done{};
 }
 
+Result<Done> command::control(ConsoleContext& console, Words words) {
+  const auto current = loaded(console);
+  if (!current) {
+    return nothing_loaded;
+  }
+  const std::string wanted = words.empty() ? "*" : model::word_of(words[0]);
+  if (words.size() == 2) {
+    const auto events = play(console, {"/control/" + wanted, {to_argument(words[1])}});
+    return events ? Result<Done>(Done{}) : events.error();
+  }
+  const Session::Present now = console.session.present();
+  std::vector<std::vector<std::string>> rows;
+  std::vector<std::string> known;
+  for (std::size_t i = 0; i < now.knobs.size(); ++i) {
+    const KnobInfo& knob = now.loaded->instrument.knobs[i];
+    known.push_back(knob.word);
+    if (fits(wanted, knob.word)) {
+      rows.push_back({knob.word, fixed(now.knobs[i], 2), knob.help});
+    }
+  }
+  if (rows.empty()) {
+    return Error{current->name + " has no control '" + wanted + "'; it has " +
+                 (known.empty() ? "none" : joined(known, ", ")) + did_you_mean(wanted, known)};
+  }
+  console.print(table(rows));
+  return Done{};
+}
+
 Result<Done> command::params(ConsoleContext& console, Words) {
   const auto current = loaded(console);
   if (!current) {
@@ -362,7 +390,20 @@ std::string describe_stability(const Instrument& instrument) {
                    fixed(std::max(0.0, margin), 2) + " of the stiffness";
 }
 
-// Returns a row such as "cc71" with its effect for every control and controller.
+// Returns the name of a control's knob and the number of its controller; of other controls the
+// source.
+std::vector<std::string> source_of(const ControlSetting& control, const Instrument& instrument) {
+  if (control.source == ControlSource::controller) {
+    for (const KnobInfo& knob : instrument.knobs) {
+      if (knob.controller == control.number) {
+        return {knob.name, "controller " + std::to_string(knob.controller) + ' '};
+      }
+    }
+  }
+  return {source_name(control), ""};
+}
+
+// Returns a row such as "Ring" or "note" with its effect for every control and controller.
 std::vector<std::vector<std::string>> control_rows(const ConsoleContext& console,
                                                    const Loaded& current) {
   std::vector<std::vector<std::string>> rows;
@@ -390,11 +431,13 @@ std::vector<std::vector<std::string>> control_rows(const ConsoleContext& console
     const std::string keys = has_all_keys ? ""
                                           : ", keys " + std::to_string(control.lowest_key) +
                                                 " to " + std::to_string(control.highest_key);
-    rows.push_back({source_name(control),
-                    (turns ? "controls " + control.target
-                           : std::string(row_of(control.gesture).name) + " at " + control.target) +
-                        ", " + range + (control.exponential ? ", exponential" : "") + keys +
-                        (turns ? now(control.target) : "")});
+    const std::vector<std::string> source = source_of(control, current.instrument);
+    rows.push_back({source[0], source[1] +
+                                   (turns ? "controls " + control.target
+                                          : std::string(row_of(control.gesture).name) + " at " +
+                                                control.target) +
+                                   ", " + range + (control.exponential ? ", exponential" : "") +
+                                   keys + (turns ? now(control.target) : "")});
   }
   return rows;
 }

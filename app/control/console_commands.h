@@ -53,6 +53,7 @@ Result<Done> learn(ConsoleContext& console, Words words);
 Result<Done> unlearn(ConsoleContext& console, Words words);
 Result<Done> undo(ConsoleContext& console, Words words);
 Result<Done> wait(ConsoleContext& console, Words words);
+Result<Done> control(ConsoleContext& console, Words words);
 Result<Done> params(ConsoleContext& console, Words words);
 Result<Done> get(ConsoleContext& console, Words words);
 Result<Done> set(ConsoleContext& console, Words words);

@@ -1,4 +1,5 @@
 // Console commands that save, undo, assign controllers and wait.
+#include <algorithm>
 #include <filesystem>
 
 #include "app/control/console_commands.h"
@@ -6,6 +7,16 @@
 #include "core/model/language/expression.h"
 
 namespace ressort::control {
+namespace {
+
+// Returns the named control, or else the parameter, that a word means in any case of letters.
+std::string meant_target(const Instrument& instrument, const std::string& word) {
+  const auto is_meant = [&](const KnobInfo& knob) { return same_but_case(knob.word, word); };
+  const auto knob = std::ranges::find_if(instrument.knobs, is_meant);
+  return knob != instrument.knobs.end() ? knob->word : meant_parameter(instrument, word);
+}
+
+}  // namespace
 
 Result<Done> command::save(ConsoleContext& console, Words words) {
   if (!loaded(console)) {
@@ -38,7 +49,7 @@ Result<Done> command::learn(ConsoleContext& console, Words words) {
   if (!current) {
     return nothing_loaded;
   }
-  const std::string target = meant_parameter(current->instrument, words[0]);
+  const std::string target = meant_target(current->instrument, words[0]);
   if (auto begun = console.session.learn(target); !begun) {
     return begun.error();
   }
@@ -51,7 +62,7 @@ Result<Done> command::unlearn(ConsoleContext& console, Words words) {
   if (!current) {
     return nothing_loaded;
   }
-  const std::string target = words.empty() ? "" : meant_parameter(current->instrument, words[0]);
+  const std::string target = words.empty() ? "" : meant_target(current->instrument, words[0]);
   const std::size_t count = console.session.unlearn(target);
   if (count == 0 && !target.empty()) {
     return Error{"no controller is assigned to '" + target + "'"};

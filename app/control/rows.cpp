@@ -49,6 +49,27 @@ Events set_parameters(const PlayCall& call) {
   return events;
 }
 
+// Moves the named controllers that a pattern matches.
+Events turn_knobs(const PlayCall& call) {
+  std::vector<Event> events;
+  std::vector<std::string> words;
+  for (const KnobInfo& knob : call.instrument.knobs) {
+    words.push_back(knob.word);
+    if (fits(call.name, knob.word)) {
+      events.push_back({.kind = EventKind::controller,
+                        .channel = call.instrument.channel,
+                        .index = static_cast<std::uint16_t>(knob.controller),
+                        .model = call.serial,
+                        .value = call.arguments[0]});
+    }
+  }
+  if (events.empty()) {
+    return Error{call.message.address + ": the preset has no such control; it has " +
+                 (words.empty() ? "none" : joined(words, ", ")) + did_you_mean(call.name, words)};
+  }
+  return events;
+}
+
 Events play_input(const PlayCall& call, const GestureRow& gesture) {
   const InputInfo& input = *call.input;
   std::string misfit;
@@ -234,17 +255,29 @@ std::vector<Row> make_rows() {
        .command_does = "sets a parameter, limited to its range",
        .details = "PARAMETER may be a pattern: 'set *_Z 0.001' sets all that end with _Z.",
        .act = command::set},
+      {.address = "/control/NAME",
+       .arguments = {{"VALUE", "the value", 0, 1}},
+       .does = "moves a named control of the preset, 0-1; without VALUE, replies with its position",
+       .play = turn_knobs,
+       .answer = answer::knobs,
+       .command = "control",
+       .group = CommandGroup::playing,
+       .words = "[CONTROL] [VALUE]",
+       .command_does = "moves a named control, 0 to 1; alone, lists the controls",
+       .details = "Every preset has its own, such as brightness and ring. 'control ring 0.8' is "
+                  "the same as moving\nthe MIDI controller of that name.",
+       .act = command::control},
       {.command = "learn",
        .group = CommandGroup::parameters,
-       .words = "PARAMETER",
-       .command_does = "assigns the next knob that you move to a parameter",
-       .details = "PARAMETER may also be an OSC address of the preset, such as /finger. The knob "
-                  "loses its "
-                  "other\nfunction until 'unlearn'. 'save NAME' saves the assignment.",
+       .words = "CONTROL|PARAMETER",
+       .command_does = "assigns the next knob that you move to a control or a parameter",
+       .details =
+           "It may also be an OSC address of the preset, such as /finger. The knob loses its "
+           "other\nfunction until 'unlearn'. 'save NAME' saves the assignment.",
        .act = command::learn},
       {.command = "unlearn",
        .group = CommandGroup::parameters,
-       .words = "[PARAMETER]",
+       .words = "[CONTROL|PARAMETER]",
        .command_does = "restores the preset's assignment of a knob, or of all knobs",
        .act = command::unlearn},
       {.command = "undo",
@@ -432,8 +465,8 @@ std::vector<Row> make_rows() {
       {.address = "/subscribe",
        .arguments = {{"SECONDS", "the seconds", 0, Subscribers::longest_lease_s, 10}, port},
        .does =
-           "sends the current state, then every change as /loaded and /param/NAME, for SECONDS, "
-           "at most 60 (10), to PORT (the sender's); repeat it to renew",
+           "sends the current state, then every change as /loaded, /param/NAME and "
+           "/control/NAME, for SECONDS, at most 60 (10), to PORT (the sender's); repeat it to renew",
        .answer = answer::subscribe},
       {.address = "/unsubscribe",
        .arguments = {port},

@@ -138,6 +138,15 @@ Tree tree_of(const Session::Present& now) {
     const std::string path = "/mass/" + info.name + (info.moves.empty() ? "" : ":2") + "/strike";
     tree.add(path, method_of(*find_row(path).row, path));
   }
+  for (std::size_t i = 0; i < instrument.knobs.size(); ++i) {
+    const KnobInfo& knob = instrument.knobs[i];
+    json control = node(knob.address(), knob.help.empty() ? knob.name : knob.help);
+    control["TYPE"] = "f";
+    control["ACCESS"] = readable | writable;
+    control["VALUE"] = {now.knobs[i]};
+    control["RANGE"] = {{{"MIN", 0.0}, {"MAX", 1.0}}};
+    tree.add(knob.address(), control);
+  }
   for (const CustomInfo& custom : instrument.custom) {
     json control = node(custom.address, "control of the preset");
     control["TYPE"] = "f";

@@ -261,6 +261,9 @@ void Process::collect_due(std::size_t frames) {
     }
     count_event(event);
     map_controller(event);
+    if (event.kind == EventKind::controller && current_ != nullptr) {
+      reports.push({Report::Kind::controller, current_->serial, event.index, event.value});
+    }
     due_.push_back(event);
     log_record({.frame = frame_ + event.frame, .event = event});
     follow_banks(event);
@@ -309,7 +312,7 @@ void Process::count_event(const Event& event) {
     meters_.last_notes[meters_.notes++ % meters_.last_notes.size()] = {
         static_cast<std::uint8_t>(event.index),
         static_cast<std::uint8_t>(std::clamp(std::lround(127.0 * event.value), 1L, 127L))};
-  } else if (event.kind == EventKind::controller) {
+  } else if (event.kind == EventKind::controller && event.model == 0) {
     ++meters_.turns;
     meters_.last_controller = static_cast<std::uint8_t>(event.index);
   }
@@ -322,9 +325,10 @@ void Process::apply_mapping_changes() {
   }
 }
 
-// Replaces a learned controller by its target, if that belongs to the current model.
+// Replaces a learned controller by its target, if that belongs to the current model. An event for
+// a named control of a model has its function already.
 void Process::map_controller(Event& event) {
-  if (event.kind != EventKind::controller || current_ == nullptr) {
+  if (event.kind != EventKind::controller || event.model != 0 || current_ == nullptr) {
     return;
   }
   const LearnedControl& control = learned_[event.index % learned_.size()];

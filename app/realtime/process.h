@@ -49,11 +49,12 @@ struct MidiPacket {
 
 // A message from the audio thread to the worker.
 struct Report {
-  enum class Kind : std::uint8_t { parameter, reset, overload, program };
+  enum class Kind : std::uint8_t { parameter, controller, reset, overload, program };
   Kind kind = Kind::reset;
   std::uint32_t model = 0;  // serial of the model
-  std::uint16_t index = 0;  // parameter, or number of voices that there is time for; 0: unlimited
-  double value = 0.0;       // value of the parameter, or the load, or 128 * bank + program
+  // Parameter, controller, or number of voices that there is time for; 0: unlimited.
+  std::uint16_t index = 0;
+  double value = 0.0;  // value of the parameter or controller, or the load, or 128 * bank + program
 };
 
 // The target of a learned controller. It overrides the preset while the model with this serial

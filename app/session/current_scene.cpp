@@ -23,7 +23,12 @@ bool is_knob(int controller) {
 
 CurrentScene::Present CurrentScene::present() const {
   const std::lock_guard lock(mutex_);
-  return {loaded_, values_};
+  Present now{loaded_, values_, turned_};
+  for (std::size_t i = 0; i < turned_.size(); ++i) {
+    const KnobInfo& knob = loaded_->instrument.knobs[i];
+    now.knobs[i] = knob.parameter ? knob.position_of(values_[*knob.parameter]) : turned_[i];
+  }
+  return now;
 }
 
 std::shared_ptr<const Loaded> CurrentScene::loaded() const {
@@ -54,6 +59,10 @@ void CurrentScene::replace(std::shared_ptr<const Loaded> loaded, std::vector<dou
   loaded_ = std::move(loaded);
   values_ = std::move(values);
   files_ = std::move(files);
+  turned_.clear();
+  for (const KnobInfo& knob : loaded_->instrument.knobs) {
+    turned_.push_back(knob.rest);
+  }
   waiting_target_.reset();
   std::erase_if(learned_, [&](const LearnedRow& row) {
     return !is_same || control_of(row.target).model == 0;
@@ -72,19 +81,40 @@ void CurrentScene::set_plan(Plan plan) {
 
 void CurrentScene::remember(std::span<const TimedEvent> events) {
   const std::lock_guard lock(mutex_);
-  const auto is_ours = [&](const Event& event) {
-    return event.kind == EventKind::parameter && event.model == loaded_->serial;
-  };
-  std::vector<std::string> names;
+  std::vector<std::pair<std::size_t, double>> changes;  // parameter and value
   for (const TimedEvent& timed : events) {
-    if (is_ours(timed.event)) {
-      names.push_back(loaded_->instrument.parameters[timed.event.index].name);
+    const Event& event = timed.event;
+    if (event.model != loaded_->serial) {
+      continue;
+    }
+    if (event.kind == EventKind::parameter) {
+      changes.emplace_back(event.index, event.value);
+    }
+    for (std::size_t i = 0; event.kind == EventKind::controller && i < turned_.size(); ++i) {
+      const KnobInfo& knob = loaded_->instrument.knobs[i];
+      if (knob.controller == event.index) {
+        turned_[i] = event.value;
+        if (knob.parameter) {
+          changes.emplace_back(*knob.parameter, knob.value_at(event.value));
+        }
+      }
     }
   }
+  std::vector<std::string> names;
+  for (const auto& [parameter, value] : changes) {
+    names.push_back(loaded_->instrument.parameters[parameter].name);
+  }
   begin_change(names);
-  for (const TimedEvent& timed : events) {
-    if (is_ours(timed.event)) {
-      values_[timed.event.index] = timed.event.value;
+  for (const auto& [parameter, value] : changes) {
+    values_[parameter] = value;
+  }
+}
+
+void CurrentScene::remember_turn(int controller, double position) {
+  const std::lock_guard lock(mutex_);
+  for (std::size_t i = 0; i < turned_.size(); ++i) {
+    if (loaded_->instrument.knobs[i].controller == controller) {
+      turned_[i] = position;
     }
   }
 }
@@ -135,9 +165,17 @@ std::optional<LastChange> CurrentScene::take_last_change() {
   return std::exchange(last_change_, std::nullopt);
 }
 
-// Returns the parameter or the preset's OSC name; model 0 if there is none of this name.
+// Returns the named knob, the parameter or the preset's OSC name; model 0 if there is none of this
+// name.
 LearnedControl CurrentScene::control_of(const std::string& target) const {
   const Instrument& instrument = loaded_->instrument;
+  for (const KnobInfo& knob : instrument.knobs) {
+    if (knob.word == target) {
+      return {.kind = EventKind::controller,
+              .index = static_cast<std::uint16_t>(knob.controller),
+              .model = loaded_->serial};
+    }
+  }
   for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
     const ParameterInfo& info = instrument.parameters[i];
     if (info.name == target && info.audio_input == 0) {
@@ -169,6 +207,9 @@ Result<Done> CurrentScene::learn(const std::string& target) {
   const std::lock_guard lock(mutex_);
   if (control_of(target).model == 0) {
     std::vector<std::string> known;
+    for (const KnobInfo& knob : loaded_->instrument.knobs) {
+      known.push_back(knob.word);
+    }
     for (const ParameterInfo& info : loaded_->instrument.parameters) {
       known.push_back(info.name);
     }
@@ -232,10 +273,15 @@ Result<std::string> CurrentScene::preset_text(const std::string& model, double e
   for (const LearnedRow& row : learned_) {
     const LearnedControl control = control_of(row.target);
     for (const ControlSetting& setting : loaded_->preset.controls) {
-      if (setting.source == ControlSource::osc && setting.address == row.target) {
+      const bool is_knob = control.kind == EventKind::controller &&
+                           setting.source == ControlSource::controller &&
+                           setting.number == control.index;
+      if (is_knob || (setting.source == ControlSource::osc && setting.address == row.target)) {
         ControlSetting same = setting;
         same.source = ControlSource::controller;
         same.number = row.controller;
+        same.name.clear();  // the knob itself keeps its name
+        same.help.clear();
         changes.learned.push_back(std::move(same));
       }
     }

@@ -50,10 +50,11 @@ class CurrentScene {
  public:
   explicit CurrentScene(Process& process) : process_(process) {}
 
-  // The scene and the values of its parameters at one moment.
+  // The scene, the values of its parameters and the positions of its knobs at one moment.
   struct Present {
     std::shared_ptr<const Loaded> loaded;
     std::vector<double> values;  // [parameter]
+    std::vector<double> knobs;   // [knob] positions, 0 to 1
   };
   Present present() const;
   // Never null. Before the first load, it has no name and no parameters.
@@ -68,8 +69,12 @@ class CurrentScene {
   // Replaces the plan of the scene. [worker]
   void set_plan(Plan plan);
 
-  // Records parameter events that a queue has accepted, as a change that can be undone.
+  // Records events of parameters and named controls that a queue has accepted, as a change that can
+  // be undone.
   void remember(std::span<const TimedEvent> events);
+
+  // Records the position of a controller that has moved. [worker]
+  void remember_turn(int controller, double position);
 
   // Returns everything that a load of another scene changes.
   LastChange all_values() const;
@@ -101,6 +106,7 @@ class CurrentScene {
   mutable std::mutex mutex_;  // guards all below, and the writing side of process_.mapping_changes
   std::shared_ptr<const Loaded> loaded_ = std::make_shared<Loaded>();
   std::vector<double> values_;  // [parameter]
+  std::vector<double> turned_;  // [knob] position at which its controller was last
   std::shared_ptr<const std::vector<SceneFile>> files_;
   std::optional<LastChange> last_change_;
   std::chrono::steady_clock::time_point change_time_;

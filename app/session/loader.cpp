@@ -269,9 +269,9 @@ class SceneReader {
         return scene;
       }
       scene.value->preset.bodies = *std::move(bodies.value);
-      scene.value->network =
-          with_body_parameters(std::move(scene.value->network), scene.value->preset);
     }
+    scene.value->network =
+        with_preset_parameters(std::move(scene.value->network), scene.value->preset);
     const std::vector<Error> unfit = find_preset_errors(scene.value->network, scene.value->preset);
     for (const Error& error : unfit) {
       scene.findings.push_back(finding_of(file.path, file.text, error));

@@ -95,9 +95,10 @@ class Session {
   // parameters within a second are one.
   std::optional<LastChange> take_last_change() { return current_.take_last_change(); }
 
-  // MIDI learn: the next knob that moves controls this parameter, or the control with this OSC
-  // name, instead of its function in the preset. Pedals, bank select and the like do not count. The
-  // pair is reported to `on_message`, and lasts until another scene is loaded.
+  // MIDI learn: the next knob that moves controls the preset's knob of this name, this parameter,
+  // or the control with this OSC name, instead of its function in the preset. Pedals, bank select
+  // and the like do not count. The pair is reported to `on_message`, and lasts until another scene
+  // is loaded.
   Result<Done> learn(const std::string& target) { return current_.learn(target); }
   // Forgets the controllers of this target, or all if it is empty. Returns how many.
   std::size_t unlearn(const std::string& target) { return current_.unlearn(target); }

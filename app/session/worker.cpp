@@ -150,6 +150,8 @@ void Worker::read_reports() {
     if (report.kind == Report::Kind::parameter && is_current) {
       const TimedEvent event = parameter_event(*loaded, report.index, report.value);
       current_.remember({&event, 1});
+    } else if (report.kind == Report::Kind::controller && is_current) {
+      current_.remember_turn(report.index, report.value);
     } else if (report.kind == Report::Kind::reset) {
       problems_.add_reset(is_current ? loaded->name : "the last model",
                           is_current && loaded->instrument.verdict == Verdict::stable);

@@ -75,7 +75,7 @@ Result<std::optional<Compiled>> compile_body(const CompileRequest& request, cons
   const BodyModel& model = request.preset.bodies.front();
   Preset rest;
   rest.bodies.assign(request.preset.bodies.begin() + 1, request.preset.bodies.end());
-  Network body = with_body_parameters(model.network, rest);
+  Network body = with_preset_parameters(model.network, rest);
   for (Parameter& parameter : body.parameters) {
     if (const int same = find_parameter(network, parameter.name);
         same >= 0 && parameter.audio_input == 0) {

@@ -3,6 +3,7 @@
 #include <bit>
 #include <charconv>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 
 #include "core/compile/prove.h"
@@ -296,6 +297,15 @@ std::vector<std::optional<VoiceCurve>> voice_curves(const Network& network, cons
   return curves;
 }
 
+namespace {
+
+std::optional<std::size_t> find_hardness(const Network& network, const Preset& preset) {
+  const int found = find_parameter(network, preset.hardness);
+  return found < 0 ? std::nullopt : std::optional(static_cast<std::size_t>(found));
+}
+
+}  // namespace
+
 Playing make_playing(const Network& network, const Preset& preset, const Proof& proof,
                      const TunedKeys& keys, bool bare, int voices, double gain) {
   const auto curves = voice_curves(network, preset, proof.stability);
@@ -319,6 +329,7 @@ Playing make_playing(const Network& network, const Preset& preset, const Proof& 
       .keys_hz = key_frequencies(preset),
       .velocity = {.points = preset.velocity_points, .exponent = std::exp2(-2.0 * preset.velocity)},
       .channels = static_cast<ChannelMask>(preset.channels),
+      .hardness = find_hardness(network, preset),
       .mono = preset.mono,
       .legato = preset.legato,
       .glide_s = preset.glide_s,
@@ -335,6 +346,64 @@ Playing make_playing(const Network& network, const Preset& preset, const Proof& 
       .limits = std::move(limits),
       .curves = curves,
       .rest_bounds = proof.rest_bounds};
+}
+
+namespace {
+
+// Returns the named controllers. Those with a usual meaning come first, in the same order in all
+// presets: brightness, ring, touch, the wheel and space.
+std::vector<KnobInfo> find_knobs(const Network& network, const Preset& preset) {
+  constexpr int usual[] = {74, 71, 16, 1, 91};
+  std::vector<KnobInfo> knobs;
+  for (const ControlSetting& named : preset.controls) {
+    const auto is_same = [&](const ControlSetting& control) {
+      return control.source == ControlSource::controller && control.number == named.number;
+    };
+    if (named.name.empty() || std::ranges::any_of(knobs, [&](const KnobInfo& knob) {
+          return knob.controller == named.number;
+        })) {
+      continue;
+    }
+    const auto turns = std::ranges::find_if(preset.controls, [&](const ControlSetting& control) {
+      return is_same(control) && control.gesture == Gesture::parameter;
+    });
+    const ControlSetting& first = turns != preset.controls.end() ? *turns : named;
+    KnobInfo knob{.name = named.name,
+                  .word = model::word_of(named.name),
+                  .help = named.help,
+                  .controller = named.number,
+                  .low = first.low,
+                  .high = first.high,
+                  .exponential = first.exponential};
+    if (first.gesture == Gesture::parameter) {
+      knob.parameter = static_cast<std::size_t>(find_parameter(network, first.target));
+    } else if (first.gesture == Gesture::position) {
+      const Input& input =
+          network.inputs[static_cast<std::size_t>(find_input(network, first.target))];
+      knob.rest = input.is_force ? 0.0 : knob.position_of(network.masses[input.mass].position);
+    }
+    knobs.push_back(std::move(knob));
+  }
+  std::ranges::stable_sort(knobs, {}, [&](const KnobInfo& knob) {
+    return std::ranges::find(usual, knob.controller) - std::begin(usual);
+  });
+  return knobs;
+}
+
+}  // namespace
+
+double KnobInfo::value_at(double position) const {
+  return exponential ? low * std::pow(high / low, position) : low + (high - low) * position;
+}
+
+double KnobInfo::position_of(double value) const {
+  if (low == high) {
+    return 0.0;
+  }
+  const double position = exponential && value * low > 0.0
+                              ? std::log(value / low) / std::log(high / low)
+                              : (value - low) / (high - low);
+  return std::clamp(position, 0.0, 1.0);
 }
 
 Instrument make_instrument(const Network& network, const Preset& preset, const Proof& proof,
@@ -354,6 +423,7 @@ Instrument make_instrument(const Network& network, const Preset& preset, const P
   return {.parameters = proof.stability.parameters,
           .inputs = std::move(inputs),
           .custom = std::move(custom),
+          .knobs = find_knobs(network, preset),
           .blow = find_blow(network, controls, mode ? mode->frequency_hz : 220.0, gain),
           .outputs = output_count(network),
           .audio_inputs = audio_input_count(network, preset),

@@ -35,6 +35,25 @@ struct CustomInfo {
   int row = 0;  // Event::index of EventKind::custom
 };
 
+// A controller to which the preset gives a name. The position of the knob, 0 to 1, is that of its
+// parameter in the knob's range, whatever has set the parameter.
+struct KnobInfo {
+  std::string name;  // "Bow pressure"
+  std::string word;  // the same in addresses and commands: "bow-pressure"
+  std::string help;  // one line; may be empty
+  int controller = 0;
+  std::optional<std::size_t> parameter;  // nothing: the knob moves inputs only
+  double low = 0.0;                      // value at 0 and at 1
+  double high = 1.0;
+  bool exponential = false;
+  double rest = 0.0;  // position of a knob without a parameter until it moves
+
+  std::string address() const { return "/control/" + word; }
+  double value_at(double position) const;
+  // Returns the position at which the knob gives this value, limited to 0..1.
+  double position_of(double value) const;
+};
+
 // Masses that can be struck by name: a mass, a place on a macro, or all nodes of a macro, which are
 // named "NAME:1" and so on. Culled masses are not listed.
 struct StruckInfo {
@@ -48,6 +67,7 @@ struct Instrument {
   std::vector<ParameterInfo> parameters;  // [parameter]
   std::vector<InputInfo> inputs;
   std::vector<CustomInfo> custom;
+  std::vector<KnobInfo> knobs;     // brightness, ring, touch, the wheel and space first
   std::vector<StruckInfo> struck;  // sorted by name
   double blow = 0.0;  // force of a hard strike on a mass during one sample at 44,100 Hz
   int outputs = 0;

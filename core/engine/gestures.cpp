@@ -141,6 +141,7 @@ void Gestures::play(const GestureRow& gesture, std::size_t input, Stroke stroke,
   set_pitch(*latest, std::sqrt(keyboard.factor_of(voice, parameters.highest_factor())));
   stroke.pitch = stroke.settings.follows_pitch ? pitches_[*latest] : 1.0;
   stroke.seed = seed_of(voice, input);
+  stroke.hardness = playing_.hardness ? parameters.values()[*playing_.hardness] : 0.0;
   // A voice's gain applies to all that rings in it. With fixed tuning all keys strike one network,
   // so the gain must not follow each blow: it is the loudest blow's, and a softer blow has less
   // force.

@@ -110,6 +110,8 @@ struct Playing {
   KeyFrequencies keys_hz = equal_temperament(440.0, 0.0);
   VelocityCurve velocity;
   ChannelMask channels = midi_channels;  // MIDI channels to listen to
+  // Parameter that is added to the amount of a blow for its length.
+  std::optional<std::size_t> hardness;
   bool mono = false;                     // one voice per channel plays the latest held key
   bool legato = false;                   // a key pressed while another is held is not struck
   double glide_s = 0.0;                  // portamento time, linear in cents

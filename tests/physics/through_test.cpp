@@ -45,7 +45,7 @@ Preset through(Preset preset, const std::vector<std::string>& bodies) {
 
 Compiled compiled(const std::string& text, const Preset& preset,
                   const CompileOptions& options = {}) {
-  auto made = compile_network(with_body_parameters(network_of(text), preset), preset, options);
+  auto made = compile_network(with_preset_parameters(network_of(text), preset), preset, options);
   INFO((made ? "" : made.error().message));
   REQUIRE(made);
   return *std::move(made);
@@ -340,7 +340,7 @@ TEST_CASE("an engine with a body is continued in another form, and with another 
 TEST_CASE("an output without an input of the body is an error at the preset's line", "[through]") {
   Preset preset = through(support::struck(1), {box, box});
   preset.through_location = {2, 11};
-  const Network network = with_body_parameters(network_of(strings), preset);
+  const Network network = with_preset_parameters(network_of(strings), preset);
   const auto errors = find_preset_errors(network, preset);
   REQUIRE(errors.size() == 1);
   CHECK(errors[0].message ==

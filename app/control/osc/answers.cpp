@@ -125,6 +125,25 @@ void answer::parameters(const Query& query) {
   });
 }
 
+void answer::knobs(const Query& query) {
+  if (!query.client.may_have_rows(query.message.address)) {
+    return;
+  }
+  const Session::Present now = query.session.present();
+  std::vector<Reply> rows;
+  for (std::size_t i = 0; i < now.knobs.size(); ++i) {
+    const KnobInfo& knob = now.loaded->instrument.knobs[i];
+    if (fits(query.name, knob.word)) {
+      rows.push_back(Reply(knob.address()).real(now.knobs[i]));
+    }
+  }
+  query.client.answer_rows(rows);
+  if (rows.empty()) {
+    query.client.error(query.message.address,
+                       "the preset has no such control; /control/* lists its controls");
+  }
+}
+
 void answer::ranges(const Query& query) {
   answer_parameters(query, [](const ParameterInfo& info, std::vector<Reply>& rows) {
     rows.push_back(Reply("/param/" + info.name + "/range")
@@ -210,6 +229,12 @@ void answer::describe(const Query& query) {
         .real(info.maximum)
         .real(info.safe.lowest)
         .real(info.safe.highest);
+  }
+  const Session::Present now = query.session.present();
+  for (std::size_t i = 0; i < now.knobs.size(); ++i) {
+    const KnobInfo& knob = now.loaded->instrument.knobs[i];
+    row(knob.address(), "f", knob.help.empty() ? knob.name : knob.help);
+    rows.back().real(now.knobs[i]).real(0.0).real(1.0);
   }
   std::set<std::string_view> customs;  // One address may control several targets.
   for (const CustomInfo& custom : loaded->instrument.custom) {

@@ -7,6 +7,7 @@ namespace ressort::control::answer {
 
 // Replies /param/NAME f:value for every parameter that matches.
 void parameters(const Query& query);
+void knobs(const Query& query);
 
 // Replies /param/NAME/range f:minimum f:maximum f:lowest f:highest; the last two are the stable
 // range, infinite if unlimited.

@@ -20,6 +20,11 @@ std::vector<Reply> changes(const Session::Present& before, const Session::Presen
           Reply("/param/" + now.loaded->instrument.parameters[i].name).real(now.values[i]));
     }
   }
+  for (std::size_t i = 0; i < now.knobs.size(); ++i) {
+    if (is_other || before.knobs[i] != now.knobs[i]) {
+      rows.push_back(Reply(now.loaded->instrument.knobs[i].address()).real(now.knobs[i]));
+    }
+  }
   return rows;
 }
 

@@ -24,9 +24,10 @@ class Subscribers {
   bool remove(const OscClient& client);  // Removes the client from all kinds of news.
 
   // Sends the changes since the last call: "/loaded NAME" and then all parameters after a load,
-  // else the changed ones as "/param/NAME VALUE". A new subscriber gets everything. Every new
-  // timbre frame is sent as "/timbre.frame NUMBER FIGURE...", with the figures before the harmonic
-  // ones; an absent figure is 0. Returns the time until the next call in ms, or -1 for never.
+  // else the changed ones as "/param/NAME VALUE" and "/control/NAME VALUE". A new subscriber gets
+  // everything. Every new timbre frame is sent as "/timbre.frame NUMBER FIGURE...", with the
+  // figures before the harmonic ones; an absent figure is 0. Returns the time until the next call
+  // in ms, or -1 for never.
   int send_changes(Session& session, std::int64_t now_ns);
 
  private:

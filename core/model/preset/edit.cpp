@@ -55,6 +55,8 @@ std::string print_control(const ControlSetting& control) {
   const ControlSetting usual;
   std::string text = "\n[[control]]\nfrom = " + in_quotes(source_name(control)) +
                      "\nto = " + in_quotes(control.target) + "\n";
+  text += control.name.empty() ? "" : "name = " + in_quotes(control.name) + "\n";
+  text += control.help.empty() ? "" : "help = " + in_quotes(control.help) + "\n";
   if (control.gesture != Gesture::parameter) {
     text += "how = " + in_quotes(row_of(control.gesture).name) + "\n";
   }

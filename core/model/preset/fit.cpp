@@ -198,13 +198,18 @@ Network heard_where_touched(Network network, const Preset& preset) {
   return network;
 }
 
-Network with_body_parameters(Network network, const Preset& preset) {
+Network with_preset_parameters(Network network, const Preset& preset) {
   for (const BodyModel& body : preset.bodies) {
     for (const Parameter& parameter : body.network.parameters) {
       if (parameter.audio_input == 0 && find_parameter(network, parameter.name) < 0) {
         network.parameters.push_back(parameter);
       }
     }
+  }
+  const auto setting =
+      std::ranges::find(preset.parameters, preset.hardness, &ParameterSetting::name);
+  if (setting != preset.parameters.end() && find_parameter(network, preset.hardness) < 0) {
+    network.parameters.push_back({.name = setting->name, .value = setting->value});
   }
   return network;
 }
@@ -240,6 +245,14 @@ std::vector<Error> find_preset_errors(const Network& network, const Preset& pres
                          ? "'tuned_along' must name one of [parameters] with a range"
                          : "keys stay in tune along the morph anyway; remove 'tuned_along'",
                      preset.tuned_along_location.line, preset.tuned_along_location.column});
+  }
+  const auto is_blow = [](const ControlSetting& control) {
+    return control.longest_ms > 0.0 && control.gesture != Gesture::noise;
+  };
+  if (!preset.hardness.empty() && (find_parameter(network, preset.hardness) < 0 ||
+                                   std::ranges::none_of(preset.controls, is_blow))) {
+    found.push_back({"'hardness' must name one of [parameters], and a blow must have 'length_ms'",
+                     preset.hardness_location.line, preset.hardness_location.column});
   }
   for (const ControlSetting& control : preset.controls) {
     if (std::string message = misfit(network, preset, control); !message.empty()) {

@@ -38,10 +38,11 @@ Network heard_where_touched(Network network, const Preset& preset);
 // order of the preset's lines. [any thread but audio]
 std::vector<Error> find_preset_errors(const Network& network, const Preset& preset);
 
-// Returns the network with the parameters of the preset's bodies that it does not have itself, at
-// their values, so that they are parameters of the preset. A parameter of the same name is shared.
-// Parameters that an audio input of a body sets are not added. [any thread but audio]
-Network with_body_parameters(Network network, const Preset& preset);
+// Returns the network with the parameters of the preset's bodies and of `hardness` that it does not
+// have itself, at their values, so that they are parameters of the preset. A parameter of the same
+// name is shared. Parameters that an audio input of a body sets are not added. [any thread but
+// audio]
+Network with_preset_parameters(Network network, const Preset& preset);
 
 // Sets is_fixed for the elements in the preset's `fixed`. O(elements) [any thread but audio]
 Network with_fixed(Network network, const Preset& preset);

@@ -472,6 +472,46 @@ Gesture usual_gesture(std::string_view target) {
 }
 
 // Reads "round_robin = [1, 2]".
+// Reads the name and the help of a controller. All controls of one controller are one knob, which
+// has one name.
+void read_name(const toml::table& table, TomlTable& reader, const Preset& preset,
+               ControlSetting& control) {
+  constexpr std::size_t longest = 40;
+  const bool has_help = reader.text("help", control.help);
+  if (!reader.text("name", control.name)) {
+    if (has_help) {
+      reader.fail(*table.get("help"), "'help' is for a control with a 'name'");
+    }
+    return;
+  }
+  const toml::node& node = *table.get("name");
+  const auto is_plain = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == ' ' || c == '-';
+  };
+  if (control.name.empty() || control.name.size() > longest || control.name.front() == ' ' ||
+      control.name.back() == ' ' || !std::ranges::all_of(control.name, is_plain)) {
+    reader.fail(node, "a name has 1 to 40 letters, digits, blanks and hyphens");
+  } else if (control.source != ControlSource::controller) {
+    reader.fail(node, "only a controller, such as \"cc74\", has a name");
+  }
+  for (const ControlSetting& other : preset.controls) {
+    if (other.name.empty()) {
+      continue;
+    }
+    const bool is_same = other.number == control.number;
+    if (is_same && other.name != control.name) {
+      reader.fail(node, "cc" + std::to_string(control.number) + " already has the name " +
+                            quoted(other.name) + "; remove one of them");
+      return;
+    }
+    if (!is_same && word_of(other.name) == word_of(control.name)) {
+      reader.fail(node, quoted(control.name) + " is already the name of cc" +
+                            std::to_string(other.number) + "; choose another");
+      return;
+    }
+  }
+}
+
 void read_round_robin(TomlTable& reader, ControlSetting& control) {
   constexpr double most_turns = 16.0;
   double turn = control.turn;
@@ -578,6 +618,7 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
   if ((reader.text("to", control.target) || table.get("to") == nullptr) && control.target.empty()) {
     reader.fail(table, "a control needs 'to': an input such as \"in1\" or a parameter");
   }
+  read_name(table, reader, preset, control);
   control.gesture = usual_gesture(control.target);
   if (std::string how; reader.text("how", how)) {
     const auto* row = std::find_if(
@@ -918,6 +959,9 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
   if (reader.text("tuned_along", preset.tuned_along)) {
     preset.tuned_along_location = location_of(*root.get("tuned_along"));
   }
+  if (reader.text("hardness", preset.hardness)) {
+    preset.hardness_location = location_of(*root.get("hardness"));
+  }
   read_by_key(root, reader,
               {.name = "keys_db",
                .example = "[[36, 7], [60, 0]]",
@@ -1007,6 +1051,14 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
 }
 
 }  // namespace
+
+std::string word_of(std::string_view name) {
+  std::string word(name);
+  std::ranges::transform(word, word.begin(), [](unsigned char c) {
+    return c == ' ' ? '-' : static_cast<char>(std::tolower(c));
+  });
+  return word;
+}
 
 std::vector<double> curve_keys(const ControlSetting& control) {
   std::set<double> keys;

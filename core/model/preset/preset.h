@@ -46,6 +46,8 @@ struct ControlSetting {
   int number = 0;       // controller (0..127), audio channel (from 1), or index of the LFO
   std::string address;  // OSC name, such as "/finger", or the name of the LFO
   std::string target;   // "in1" or a parameter's name; for an LFO "pitch" or "level"
+  std::string name;     // name of the controller for the player, such as "Bow pressure"
+  std::string help;     // one line
   Gesture gesture = Gesture::position;
   double low = 0.0;   // values for 0 and 1 of the source: a position, a force, a velocity in
   double high = 1.0;  //   units per sample at 44 100 Hz, or a parameter's value
@@ -77,6 +79,9 @@ struct ControlSetting {
   SourceLocation location;
   bool operator==(const ControlSetting&) const = default;
 };
+
+// Returns a controller's name as one word, for addresses and commands: "bow-pressure".
+std::string word_of(std::string_view name);
 
 // Returns the keys at which a number of the control is given, ascending, and the control with the
 // numbers of one key. [any thread but audio]
@@ -129,6 +134,8 @@ struct Preset {
   std::vector<CurvePoint> flattening_cents;
   std::string tuned_along;  // parameter along which keys stay in tune; empty: none
   SourceLocation tuned_along_location;
+  std::string hardness;  // parameter that is added to the amount of a blow for its length
+  SourceLocation hardness_location;
   double a4_hz = usual_a4_hz;  // reference pitch
   std::string scale;           // Scala file next to the preset; empty: equal temperament
   std::string keyboard_map;    // Scala keyboard map

@@ -162,6 +162,60 @@ TEST_CASE("presets are loaded one after the other", "[osc_subscribe]") {
   CHECK(has(osc.harness.say("previous"), "zither: 3 masses"));
 }
 
+TEST_CASE("subscribers receive the positions of named controls", "[osc_subscribe]") {
+  OscHarness osc;
+  Harness& h = osc.harness;
+  osc.data.write("models/finger.mdl", scenes::poly_triangle() +
+                                          "@in2 posInput 0.\n"
+                                          "@c contact @in2 @m_m0 0.01 0.01 0.5\n");
+  osc.data.write("presets/knobs.toml",
+                 "model = \"finger.mdl\"\n[parameters]\n"
+                 "m_K = { value = 0.1, range = [0.01, 0.2] }\n"
+                 "[[control]]\nfrom = \"cc74\"\nto = \"m_K\"\nname = \"Brightness\"\n"
+                 "range = [0.05, 0.15]\n"
+                 "[[control]]\nfrom = \"cc16\"\nto = \"in2\"\nname = \"Touch\"\n"
+                 "how = \"touch\"\nrange = [-2.0, 0.0]\n");
+  REQUIRE(has(h.say("load knobs"), "knobs: 3 masses"));
+  h.play();
+  Client listener(osc.server->port());
+  Client other(osc.server->port());
+  REQUIRE(listener.ask(message("/subscribe", {30})).address == "/subscribe.reply");
+  CHECK(value(next(listener, "/control/brightness")) == 0.5f);  // 0.1 between 0.05 and 0.15
+  CHECK(value(next(listener, "/control/touch")) == 0.0f);
+  // A controller with a parameter is reported with every change of the parameter.
+  h.say("set m_K 0.125");
+  h.play();
+  CHECK(value(next(listener, "/control/brightness")) == 0.75f);
+  other.send(message("/control/brightness", {0.25f}));
+  other.sync();
+  h.play();
+  CHECK(value(next(listener, "/control/brightness")) == 0.25f);
+  CHECK(*h.session.parameter("m_K") == Approx(0.075).epsilon(1e-6));
+  // One that moves an input is reported when it moves, whatever has moved it.
+  const auto turn = [&](int controller, double position) {
+    const TimedEvent event{{.kind = EventKind::controller,
+                            .index = static_cast<std::uint16_t>(controller),
+                            .value = position}};
+    REQUIRE(h.process.send(h.process.from_midi, {&event, 1}));
+    h.play();
+  };
+  turn(16, 0.5);
+  CHECK(value(next(listener, "/control/touch")) == 0.5f);
+  h.say("control touch 1");
+  h.play();
+  CHECK(value(next(listener, "/control/touch")) == 1.0f);
+  CHECK(value(other.ask(message("/control/touch"))) == 1.0f);
+  // A knob that has learned the name moves the control, and its own controller still does.
+  h.say("learn Touch");
+  turn(20, 0.5);
+  while (h.session.learned().empty()) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  turn(20, 0.125);
+  CHECK(value(next(listener, "/control/touch")) == 0.125f);
+  CHECK(has(h.say("control"), "brightness  0.25\ntouch       0.12"));
+}
+
 TEST_CASE("a subscription ends with its lease", "[osc_subscribe]") {
   OscHarness osc;
   Client listener(osc.server->port());

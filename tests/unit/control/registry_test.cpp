@@ -25,7 +25,28 @@ const Instrument& instrument() {
                         .low = 0.05,
                         .high = 0.2},
                        {.source = ControlSource::osc, .address = "/both", .target = "in1"},
-                       {.source = ControlSource::osc, .address = "/both", .target = "in2"}};
+                       {.source = ControlSource::osc, .address = "/both", .target = "in2"},
+                       {.source = ControlSource::controller,
+                        .number = 71,
+                        .target = "s_Z",
+                        .name = "s_K",
+                        .gesture = Gesture::parameter,
+                        .low = 0.01,
+                        .high = 0.0},
+                       {.source = ControlSource::controller,
+                        .number = 16,
+                        .target = "in2",
+                        .name = "Bow pressure",
+                        .low = -1.0},
+                       {.source = ControlSource::controller,
+                        .number = 74,
+                        .target = "s_K",
+                        .name = "Brightness",
+                        .help = "How bright it is",
+                        .gesture = Gesture::parameter,
+                        .low = 0.05,
+                        .high = 0.2,
+                        .exponential = true}};
     auto compiled =
         compile_network(network_of(scenes::string("s", 5, "0.1", "0.001") +
                                    "@in1 posInput 0.\n@in2 posInput 0.\n@in3 frcInput @s_m0\n"
@@ -127,6 +148,34 @@ TEST_CASE("every playing address becomes its event", "[registry]") {
   check((*both)[0], EventKind::custom, 4, 0.25, 9);
   check((*both)[1], EventKind::custom, 5, 0.25, 9);
   check(event("/brightness 1"), EventKind::custom, 3, 1.0, 9);
+}
+
+TEST_CASE("a named control moves its controller", "[registry]") {
+  check(event("/control/brightness 0.4"), EventKind::controller, 74, 0.4, 9);
+  check(event("/control/bow-pressure 1"), EventKind::controller, 16, 1.0, 9);
+  const auto several = to_events(call("/control/b* 0.25"), instrument(), 9);
+  REQUIRE(several);
+  CHECK(several->size() == 2);
+  check_error("/control/bright 1",
+              "/control/bright: the preset has no such control; it has brightness, s_k, "
+              "bow-pressure");
+  check_error("/control/brightness 1.5",
+              "/control/brightness: the value must lie between 0 and 1, found 1.5");
+}
+
+TEST_CASE("named controls come in the usual order, at the positions of their parameters",
+          "[registry]") {
+  const std::vector<KnobInfo>& knobs = instrument().knobs;
+  REQUIRE(knobs.size() == 3);
+  CHECK(knobs[0].name == "Brightness");
+  CHECK(knobs[0].help == "How bright it is");
+  CHECK(knobs[0].address() == "/control/brightness");
+  CHECK(knobs[0].position_of(0.1) == Approx(0.5).epsilon(1e-12));  // 0.1 / 0.05 = 0.2 / 0.1
+  CHECK(knobs[0].position_of(0.3) == 1.0);
+  CHECK(knobs[1].controller == 71);
+  CHECK(knobs[1].position_of(0.0025) == Approx(0.75).epsilon(1e-12));
+  CHECK_FALSE(knobs[2].parameter);
+  CHECK(knobs[2].rest == 0.5);  // the input starts at 0 of -1 to 1
 }
 
 TEST_CASE("masses are struck by name, those of macros by number", "[registry]") {
@@ -262,7 +311,10 @@ TEST_CASE("every row is found by its address and has an interface", "[registry]"
     std::string name;
     for (const std::string hole : {"NAME", "N"}) {
       if (const auto at = address.find("/" + hole); at != std::string::npos) {
-        name = hole == "N" ? "1" : address.starts_with("/mass/") ? "s_m0" : "s_K";
+        name = hole == "N"                        ? "1"
+               : address.starts_with("/mass/")    ? "s_m0"
+               : address.starts_with("/control/") ? "s_k"
+                                                  : "s_K";
         address.replace(at + 1, hole.size(), name);
         break;
       }

@@ -1,6 +1,7 @@
 // Gestures: the motion of an input by closed forms, of the driver alone and in the engine.
 #include "core/gesture.h"
 
+#include "core/model/preset/fit.h"
 #include "tests/support/networks/reference_network.h"
 #include "tests/support/player.h"
 
@@ -379,6 +380,42 @@ TEST_CASE("audio drives the inputs of one voice of many like those of a single v
     CHECK(peak(alone.y()) > 0.01);
     CHECK(error.relative() < 1e-12);
   }
+}
+
+// At velocity 1/2 and hardness h a blow lasts 4 ms (1/4)^(1/2 + h).
+TEST_CASE("hardness shortens a blow like a higher velocity, and leaves its force", "[gesture]") {
+  const auto heard = [](double longest_ms, double shortest_ms, double hardness) {
+    Preset preset = played({.target = "in1",
+                            .gesture = Gesture::impulse,
+                            .low = 1.0,
+                            .high = 1.0,
+                            .longest_ms = longest_ms,
+                            .shortest_ms = shortest_ms});
+    preset.hardness = "touch";
+    preset.parameters = {{"touch", 0.0, -1.0, 1.0}};
+    auto compiled =
+        compile_network(with_preset_parameters(network_of(ringing_string()), preset), preset, {});
+    REQUIRE(compiled);
+    const std::vector<ParameterInfo>& known = compiled->instrument.parameters;
+    const auto touch = std::ranges::find(known, "touch", &ParameterInfo::name);
+    const auto index = static_cast<std::uint16_t>(touch - known.begin());
+    Player player(*std::move(compiled));
+    player.run(4000, {{.kind = EventKind::parameter, .index = index, .value = hardness},
+                      {.kind = EventKind::note_on, .index = 60, .value = 0.5}});
+    return player.y();
+  };
+  const auto difference = [](const std::vector<double>& a, const std::vector<double>& b) {
+    double most = 0.0;
+    for (std::size_t n = 0; n < a.size(); ++n) {
+      most = std::max(most, std::fabs(a[n] - b[n]));
+    }
+    return most / peak(a);
+  };
+  CHECK(difference(heard(2.0, 2.0, 0.0), heard(4.0, 1.0, 0.0)) < 1e-12);
+  CHECK(difference(heard(1.0, 1.0, 0.0), heard(4.0, 1.0, 0.5)) < 1e-12);
+  CHECK(difference(heard(8.0, 8.0, 0.0), heard(4.0, 1.0, -1.0)) < 1e-12);
+  CHECK(difference(heard(0.5, 0.5, 0.0), heard(4.0, 1.0, 1.0)) < 1e-12);
+  CHECK(difference(heard(2.0, 2.0, 0.0), heard(4.0, 1.0, 0.5)) > 0.01);
 }
 
 TEST_CASE("controls of a round robin alternate from note to note", "[gesture]") {

@@ -213,6 +213,15 @@ TEST_CASE("noise, releases, LFOs and variation are read", "[preset]") {
   CHECK(read.preset.controls[0].number == 1);
 }
 
+TEST_CASE("a controller has a name and a help", "[preset]") {
+  const ControlSetting named =
+      control_of("from = \"cc16\"\nto = \"in1\"\nname = \"Bow pressure\"\nhelp = \"Its force\"");
+  CHECK(named.name == "Bow pressure");
+  CHECK(named.help == "Its force");
+  CHECK(word_of(named.name) == "bow-pressure");
+  CHECK(control_of("from = \"cc16\"\nto = \"in1\"").name.empty());
+}
+
 TEST_CASE("reserved OSC addresses are rejected", "[preset]") {
   for (const Row* const row : addresses()) {
     std::string address = row->address;
@@ -386,6 +395,28 @@ TEST_CASE("errors in presets have a line and a column", "[preset]") {
   }
 }
 
+TEST_CASE("errors in names of controllers have a line and a column", "[preset]") {
+  const std::string ring =
+      "model = \"x.mdl\"\n[[control]]\nfrom = \"cc71\"\nto = \"K\"\nname = \"Ring\"\n";
+  const auto second = [](const std::string& from, const std::string& more) {
+    return "[[control]]\nfrom = \"" + from + "\"\nto = \"K\"\n" + more;
+  };
+  const Complaint complaints[] = {
+      {ring + second("/finger", "name = \"Finger\""), 9, 8, "only a controller, such as \"cc74\""},
+      {ring + second("note", "name = \"Note\""), 9, 8, "only a controller, such as \"cc74\""},
+      {ring + second("cc1", "help = \"Decay\""), 9, 8, "'help' is for a control with a 'name'"},
+      {ring + second("cc1", "name = \"\""), 9, 8, "a name has 1 to 40 letters"},
+      {ring + second("cc1", "name = \"a/b\""), 9, 8, "a name has 1 to 40 letters"},
+      {ring + second("cc71", "name = \"Decay\""), 9, 8,
+       "cc71 already has the name 'Ring'; remove one of them"},
+      {ring + second("cc72", "name = \"ring\""), 9, 8,
+       "'ring' is already the name of cc71; choose another"},
+  };
+  for (const Complaint& complaint : complaints) {
+    check_error(complaint);
+  }
+}
+
 TEST_CASE("all errors of a preset are reported in order", "[preset]") {
   const auto read = parse_preset(
       "voices = 0\n"
@@ -534,6 +565,24 @@ TEST_CASE("all mismatches between preset and model are reported", "[preset]") {
   CHECK(found[1].message == "the model has no input 'in2'; it has 1");
   CHECK(found[2].line == 9);
   CHECK(found[2].message == "the model has no parameter 'P'; it has m_K, m_Z");
+}
+
+TEST_CASE("the hardness of blows is a parameter, and needs blows with a length", "[preset]") {
+  const auto errors = [](const std::string& hardness, const std::string& control) {
+    const auto preset =
+        parse_preset("model = \"x.mdl\"\nhardness = \"" + hardness +
+                     "\"\n[parameters]\ntouch = { value = 0, range = [-1, 1] }\n[[control]]\n"
+                     "from = \"note\"\nto = \"in1\"\nhow = \"impulse\"\n" +
+                     control);
+    REQUIRE(preset.ok());
+    return find_preset_errors(
+        with_preset_parameters(network_of(scenes::poly_triangle()), preset.preset), preset.preset);
+  };
+  CHECK(errors("touch", "length_ms = [4, 1]").empty());
+  REQUIRE(errors("touch", "").size() == 1);
+  CHECK(errors("touch", "")[0].message.starts_with("'hardness' must name one of [parameters]"));
+  CHECK(errors("touch", "")[0].line == 2);
+  CHECK(errors("hard", "length_ms = [4, 1]").size() == 2);  // and 'touch' is no parameter
 }
 
 TEST_CASE("the default preset chooses gestures by the laws of the links", "[preset]") {
