@@ -72,6 +72,14 @@ std::string describe_json(const Session& session) {
   for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
     parameters.push_back(parameter_json(instrument.parameters[i], now.values[i]));
   }
+  json knobs = json::array();
+  for (std::size_t i = 0; i < instrument.knobs.size(); ++i) {
+    const KnobInfo& knob = instrument.knobs[i];
+    knobs.push_back({{"name", knob.name},
+                     {"address", knob.address()},
+                     {"help", knob.help},
+                     {"value", now.knobs[i]}});
+  }
   std::set<std::string> controls;
   for (const CustomInfo& custom : instrument.custom) {
     controls.insert(custom.address);
@@ -104,6 +112,7 @@ std::string describe_json(const Session& session) {
                  {"plan", plan},
                  {"addresses", rows},
                  {"parameters", parameters},
+                 {"knobs", knobs},
                  {"controls", controls},
                  {"inputs", inputs},
                  {"models", known_models()},
@@ -149,6 +158,11 @@ std::string Changes::since_last(const Session::Present& now) {
   for (std::size_t i = 0; i < now.values.size(); ++i) {
     if (is_other || told_.values[i] != now.values[i]) {
       values[now.loaded->instrument.parameters[i].name] = number(now.values[i]);
+    }
+  }
+  for (std::size_t i = 0; i < now.knobs.size(); ++i) {
+    if (is_other || told_.knobs[i] != now.knobs[i]) {
+      values[now.loaded->instrument.knobs[i].address()] = now.knobs[i];
     }
   }
   if (!values.empty()) {

@@ -86,6 +86,10 @@ class Program:
         answer = self.osc("/param/" + name)[1]
         return struct.unpack(">f", answer[-4:])[0]
 
+    def control(self, name):
+        answer = self.osc("/control/" + name)[1]
+        return struct.unpack(">f", answer[-4:])[0]
+
     def close(self):
         self.child.send_signal(signal.SIGTERM)
         try:
@@ -376,6 +380,32 @@ def slides(program, browser):
           "a parameter set at the console moves the slider")
 
 
+def turns(program, browser):
+    """Turns the knobs by keys and pointer, and from outside."""
+    names = browser.evaluate(
+        "[...document.querySelectorAll('[role=slider]')].map(d => d.getAttribute('aria-label'))")
+    check(names == ["Brightness", "Ring", "Touch", "Damping"], f"the knobs have names {names}")
+    program.osc("/control/touch", 0.5)
+    shown = "+document.querySelector('.dial[aria-label=\"Touch\"]').getAttribute('aria-valuenow')"
+    check(browser.eventually(shown + " === 50"), "a knob follows another client")
+    browser.evaluate("document.querySelector('.dial[aria-label=\"Touch\"]').focus()")
+    for _ in range(10):
+        browser.key("ArrowUp", "ArrowUp")
+    check(eventually(lambda: abs(program.control("touch") - 0.6) < 1e-6), "arrow keys turn a knob")
+    browser.key("Home", "Home")
+    check(eventually(lambda: program.control("touch") == 0.0), "Home turns it to its start")
+    browser.evaluate("document.querySelector('.dial[aria-label=\"Touch\"]').scrollIntoView()")
+    x, y = centre(browser, ".dial[aria-label='Touch']")
+    browser.mouse("mouseMoved", x, y)
+    browser.mouse("mousePressed", x, y)
+    browser.mouse("mouseMoved", x, y - 50)
+    browser.mouse("mouseReleased", x, y - 50)
+    check(eventually(lambda: abs(program.control("touch") - 0.25) < 1e-6),
+          "a drag of 200 pixels is the whole range")
+    program.type("set touch 1")
+    check(browser.eventually(shown + " === 100"), "a knob follows its parameter")
+
+
 def shows_modes(browser):
     browser.evaluate("document.getElementById('find-modes').click()")
     check(browser.eventually("document.querySelectorAll('#modes button').length === 24"),
@@ -417,6 +447,12 @@ def slows_down(program, browser):
 
 def loads(program, browser):
     browser.evaluate("document.getElementById('choose').click()")
+    first = "document.querySelector('#scenes button').firstChild.textContent"
+    browser.evaluate("document.querySelector('[aria-label=\"Favourite: Wind\"]').click()")
+    browser.evaluate("document.getElementById('library').close()")
+    browser.evaluate("document.getElementById('choose').click()")
+    check(browser.evaluate(first) == "Wind", "a favourite comes first in the list")
+    check(browser.evaluate("localStorage.getItem('favourites')") == '["Wind"]', "and is kept")
     browser.evaluate("[...document.querySelectorAll('#scenes button')]"
                      ".find(b => b.firstChild.textContent === 'BowedString').click()")
     check(browser.eventually("document.getElementById('name').textContent === 'BowedString' &&"
@@ -441,6 +477,7 @@ def test(program_path):
             plucks(program, browser)
             keys(program, browser)
             slides(program, browser)
+            turns(program, browser)
             shows_modes(browser)
             slows_down(program, browser)
             loads(program, browser)

@@ -35,7 +35,7 @@ function packet(address, ...values) {
 const waiting = [];
 let isSending = false;
 export function say(address, ...values) {
-  if (address.startsWith('/param/') || address.endsWith('/position') || address.endsWith('/bow')) {
+  if (/^\/(param|control)\//.test(address) || address.endsWith('/position') || address.endsWith('/bow')) {
     const old = waiting.findIndex(w => w[0] === address);
     if (old >= 0) waiting.splice(old, 1);
   }
@@ -83,6 +83,7 @@ async function loadModel() {
   $('name').textContent = model.name;
   $('description').textContent = model.description ||
     `${counted(model.masses, 'mass', 'masses')}, ${counted(model.link_count, 'link', 'links')}`;
+  showKnobs();
   showSliders();
   showScenes();
   $('modes').replaceChildren();
@@ -267,7 +268,7 @@ function showSliders() {
     rows.push(make('p', 'This model has no parameters.', {class: 'quiet'}));
   $('sliders').replaceChildren(...rows);
 }
-function showValue(name, value) { sliders.get(name)?.(value); }
+function showValue(name, value) { (knobs.get(name) ?? sliders.get(name))?.(value); }
 
 // Returns for example " of 'r1' and 2 more".
 function users(name) {
@@ -287,6 +288,56 @@ function showLimits() {
       'All parameters are far from their limits of stability.' :
       `Nearest to its limit of stability: ${nearest}${users(nearest)}, at ${
           (100 * share).toFixed(0)} % of it.`;
+}
+
+// --- the named controls --------------------------------------------------------------------------
+
+const knobs = new Map();  // Maps each address to the function that shows its position.
+
+// Makes a knob: drag it up or to the right, turn the wheel, or use the keys of a slider.
+function makeKnob({ name, address, help, value: start }) {
+  const step = { ArrowUp: 0.01, ArrowRight: 0.01, ArrowDown: -0.01, ArrowLeft: -0.01, PageUp: 0.1, PageDown: -0.1, Home: -1, End: 1 };
+  const dial = make('div', undefined, {
+    class: 'dial', role: 'slider', tabindex: 0, 'aria-label': name, title: help,
+    'aria-valuemin': 0, 'aria-valuemax': 100,
+  });
+  const output = make('output');
+  let value = start, held = null;
+  const show = to => {
+    value = Math.min(1, Math.max(0, to));
+    dial.style.setProperty('--turn', value);
+    output.textContent = Math.round(100 * value);
+    dial.setAttribute('aria-valuenow', Math.round(100 * value));
+  };
+  const turn = to => { show(to); say(address, value); };
+  dial.addEventListener('keydown', event => {
+    if (!(event.key in step)) return;
+    turn(value + step[event.key]);
+    event.preventDefault();
+  });
+  dial.addEventListener('pointerdown', event => {
+    dial.setPointerCapture(event.pointerId);
+    held = { from: value, way: event.clientX - event.clientY };
+  });
+  dial.addEventListener('pointermove', event => {
+    if (held) turn(held.from + (event.clientX - event.clientY - held.way) / 200);
+  });
+  for (const end of ['pointerup', 'pointercancel']) dial.addEventListener(end, () => { held = null; });
+  dial.addEventListener('wheel', event => {
+    turn(value - Math.sign(event.deltaY) * 0.02);
+    event.preventDefault();
+  }, { passive: false });
+  show(start);
+  knobs.set(address, to => { if (!held) show(to); });
+  const knob = make('div', undefined, { class: 'knob' });
+  knob.append(dial, make('span', name), output);
+  return knob;
+}
+
+function showKnobs() {
+  knobs.clear();
+  $('controls').hidden = !model.knobs.length;
+  $('knobs').replaceChildren(...model.knobs.map(makeKnob));
 }
 
 // --- modes ---------------------------------------------------------------------------------------------
@@ -328,11 +379,25 @@ $('find-modes').addEventListener('click', async () => {
 
 // --- the library ---------------------------------------------------------------------------------------
 
+const favourites = new Set(JSON.parse(localStorage.getItem('favourites') ?? '[]'));
+
+function makeStar(name) {
+  const star = make('button', '\u2605', { class: 'star', 'aria-label': `Favourite: ${name}`, 'aria-pressed': favourites.has(name) });
+  star.addEventListener('click', () => {
+    if (!favourites.delete(name)) favourites.add(name);
+    star.setAttribute('aria-pressed', favourites.has(name));
+    localStorage.setItem('favourites', JSON.stringify([...favourites]));
+  });
+  return star;
+}
+
+// Lists all instruments that fit the search, the favourites first.
 function showScenes() {
   const wanted = $('filter').value.toLowerCase();
   const rows = [...model.presets.map(([name, line]) => [name, line, '/preset/load']),
     ...model.models.filter(name => !model.presets.some(p => p[0] === name)).map(name => [name, 'a model without a preset', '/model/load'])];
   $('scenes').replaceChildren(...rows.filter(([name, line]) => (name + ' ' + line).toLowerCase().includes(wanted))
+    .sort((a, b) => favourites.has(b[0]) - favourites.has(a[0]))
     .map(([name, line, address]) => {
       const button = make('button', name);
       if (name === model.name) button.setAttribute('aria-current', 'true');
@@ -343,12 +408,12 @@ function showScenes() {
         say(address, name);
       });
       const item = make('li');
-      item.append(button);
+      item.append(button, makeStar(name));
       return item;
     }));
 }
 $('filter').addEventListener('input', showScenes);
-$('choose').addEventListener('click', () => { $('library').showModal(); $('filter').focus(); });
+$('choose').addEventListener('click', () => { showScenes(); $('library').showModal(); $('filter').focus(); });
 $('panic').addEventListener('click', () => say('/panic'));
 
 // --- keys ------------------------------------------------------------------------------------------------
