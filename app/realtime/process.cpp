@@ -261,7 +261,8 @@ void Process::collect_due(std::size_t frames) {
     }
     count_event(event);
     map_controller(event);
-    if (event.kind == EventKind::controller && current_ != nullptr) {
+    if (event.kind == EventKind::controller && current_ != nullptr &&
+        current_->engine->listens_to(event.channel)) {
       reports.push({Report::Kind::controller, current_->serial, event.index, event.value});
     }
     due_.push_back(event);

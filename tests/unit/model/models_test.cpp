@@ -1,6 +1,7 @@
 // The shipped instruments.
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 #include <tuple>
 
@@ -62,6 +63,35 @@ TEST_CASE("the models are the published networks", "[models]") {
     for (std::size_t i = 0; i < expected.outputs.size(); ++i) {
       CHECK(scene->network.masses[scene->network.outputs[i].mass].name ==
             expected.masses[expected.outputs[i].mass].name);
+    }
+  }
+}
+
+TEST_CASE("every preset has four to eight named controls, with the usual names", "[models]") {
+  const std::pair<int, std::string> usual[] = {{74, "Brightness"}, {71, "Ring"}};
+  for (const std::string& name : known_presets()) {
+    INFO(name);
+    const auto scene = load_scene(name, {});
+    REQUIRE(scene);
+    std::map<int, std::string> names;
+    std::set<int> numbers;
+    for (const ControlSetting& control : scene->preset.controls) {
+      if (control.source == ControlSource::controller) {
+        numbers.insert(control.number);
+        if (!control.name.empty()) {
+          CHECK_FALSE(control.help.empty());
+          names[control.number] = control.name;
+        }
+      }
+    }
+    CHECK(names.size() >= 4);
+    CHECK(names.size() <= 8);
+    for (const auto& [number, meaning] : usual) {
+      CHECK((!names.contains(number) || names[number] == meaning));
+    }
+    for (const int number : numbers) {
+      // The pedal of the piano is no knob, and SixStructures has nine.
+      CHECK((names.contains(number) || number == 64 || (name == "SixStructures" && number == 2)));
     }
   }
 }
