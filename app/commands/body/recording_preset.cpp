@@ -57,8 +57,10 @@ std::string strike(double direction, int turn) {
          ", 2]\nlength_ms = [4.0, 0.05]\n";
 }
 
-std::string knob(const std::string& from, const std::string& to, const std::string& range) {
-  return "\n[[control]]\nfrom = \"" + from + "\"\nto = \"" + to + "\"\nrange = " + range + "\n";
+std::string knob(const std::string& from, const std::string& to, const std::string& name,
+                 const std::string& range) {
+  return "\n[[control]]\nfrom = \"" + from + "\"\nto = \"" + to + "\"\nname = \"" + name +
+         "\"\nrange = " + range + "\n";
 }
 
 }  // namespace
@@ -144,15 +146,13 @@ std::string played_preset(const Identification& found, const std::vector<NoiseBa
   }
   const std::size_t places = 3 + found.sound.size() + noise.size();
   const std::string range = "[0, " + place_of(places, 2) + "]";
-  std::string text = "model = \"" + model + "\"\ndescription = \"" + source + ": " +
-                     counted(found.modes.size(), "mode", "modes") +
-                     ". cc1 moves the blow, cc71 sets the decay, "
-                     "cc74 the damping.\"\nvoices = 8\ngain = " +
-                     five_digits(wanted_peak / peak) +
-                     "\n\n[parameters]\nring = { value = 1, range = [0.5, 2] }\n"
-                     "damp = { value = 0, range = [0, 20] }\nplace = { value = " +
-                     place_of(places, 1) + ", range = " + range + " }\n" + strike(1.0, 1) +
-                     strike(-1.0, 2);
+  std::string text =
+      "model = \"" + model + "\"\ndescription = \"" + source + ": " +
+      counted(found.modes.size(), "mode", "modes") +
+      ". The wheel moves the blow.\"\nvoices = 8\ngain = " + five_digits(wanted_peak / peak) +
+      "\n\n[parameters]\nring = { value = 1, range = [0.5, 2] }\n"
+      "damp = { value = 0, range = [0, 20] }\nplace = { value = " +
+      place_of(places, 1) + ", range = " + range + " }\n" + strike(1.0, 1) + strike(-1.0, 2);
   for (std::size_t b = 0; b < noise.size(); ++b) {
     const std::string ms = five_digits(std::clamp(1e3 * noise[b].t60_s, 1.0, 10000.0));
     text += "\n[[control]]\nfrom = \"note\"\nto = \"in" + std::to_string(b + 2) +
@@ -160,9 +160,9 @@ std::string played_preset(const Identification& found, const std::vector<NoiseBa
             ms + ", " + ms + "]\nband_hz = [" + five_digits(noise[b].low_hz) + ", " +
             five_digits(noise[b].high_hz) + "]\n";
   }
-  return text + knob("cc1", "place", range) +
-         knob("cc71", "ring", "[0.5, 2]\ncurve = \"exponential\"") +
-         knob("cc74", "damp", "[20, 0]");
+  return text + knob("cc1", "place", "Place", range) +
+         knob("cc71", "ring", "Ring", "[0.5, 2]\ncurve = \"exponential\"") +
+         knob("cc74", "damp", "Brightness", "[20, 0]");
 }
 
 }  // namespace ressort::commands
