@@ -43,11 +43,11 @@ add_deep_test(scenes_more 200 ${CMAKE_COMMAND} -E env RESSORT_SCENES=1001,2000,1
 add_deep_test(heard_pitch_everywhere 120 $<TARGET_FILE:ressort_tests> "[heard_pitch_everywhere]")
 
 # Every key of all melodic presets.
-set(ressort_tuned BarMetals BassGuitar BellThirds Bourdon BowedString BrokenString Celesta CelestaBar
-  Cello ChurchBell CoupledStrings DoubleBass Dulcimer ElectricGuitar GlassHarmonica Glockenspiel
-  Guitar HandBell Harp Harpsichord IPlayTheTriangle MajorBell Marimba MarimbaTube MutedBass
-  NylonGuitar Oud Piano PluckedHarmonics PolyTriangle Resonator Sitar SixStructures SlidingFret
-  SteelDrum SteelGuitar TibetanBowl Vibraphone Viola Violin)
+set(ressort_tuned BarMetals BassGuitar BellThirds Bourdon BowedString BrokenString Celesta
+  CelestaBar Cello ChurchBell CoupledStrings DoubleBass Dulcimer ElectricGuitar GlassHarmonica
+  Glockenspiel Guitar HandBell Harp Harpsichord IPlayTheTriangle Kalimba Koto MajorBell Marimba
+  MarimbaTube MusicBox MutedBass NylonGuitar Oud Piano PluckedHarmonics PolyTriangle Resonator Sitar
+  SixStructures SlidingFret SteelDrum SteelGuitar TibetanBowl Vibraphone Viola Violin Xylophone)
 foreach(rate IN ITEMS 44100 48000 96000)
   math(EXPR seconds "${rate} / 100")
   add_deep_test(tuner_${rate} ${seconds} $<TARGET_FILE:ressort_voicing> --tuner ${rate}
