@@ -55,4 +55,10 @@ set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ
   GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
+# A program for the processor that built it would not run on others.
+if(RESSORT_LEVELS STREQUAL native)
+  file(WRITE ${packaged}/refuse.cmake "message(FATAL_ERROR \"This build is for one type of processor, "
+    "as app/run makes it. Package a build with -DRESSORT_LEVELS=all.\")\n")
+  set(CPACK_PROJECT_CONFIG_FILE ${packaged}/refuse.cmake)
+endif()
 include(CPack)
