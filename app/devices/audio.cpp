@@ -24,7 +24,8 @@ Result<AudioDevice> open_audio(const std::string& wanted, Process& process,
     auto device = kind.open(process, options);
     if (device) {
       device->kind = kind.name;
-      device->note = std::move(note);
+      note += note.empty() || device->note.empty() ? "" : "\n";
+      device->note = note + device->note;
       return device;
     }
     note += (note.empty() ? "" : "\n") + device.error().message;

@@ -34,7 +34,7 @@ struct AudioDevice {
   std::function<void()> tick;                 // call it often: connects ports that were plugged in
   std::function<Wiring()> wiring;             // connections to restore on the next device
   bool has_midi = false;                      // delivers MIDI itself, with exact frames
-  std::string note;               // backends that were tried before it, and their errors
+  std::string note;               // backends that failed before it, outputs that are missing
   std::shared_ptr<void> running;  // ends the audio thread when it is reset
 };
 

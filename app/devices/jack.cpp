@@ -159,8 +159,8 @@ void connect_unless_removed(Jack& jack, jack_port_t* ours, const char* theirs) {
   }
 }
 
-// Connects our outputs to the physical outputs in order.
-void connect(Jack& jack) {
+// Connects our outputs to the physical outputs in order. Returns false if there are none.
+bool connect(Jack& jack) {
   const Ports speakers(jack_get_ports(jack.client, nullptr, JACK_DEFAULT_AUDIO_TYPE,
                                       JackPortIsPhysical | JackPortIsInput),
                        jack_free);
@@ -168,6 +168,7 @@ void connect(Jack& jack) {
        ++i) {
     connect_unless_removed(jack, jack.outputs[i], speakers.get()[i]);
   }
+  return speakers && speakers.get()[0] != nullptr;
 }
 
 void connect_midi(Jack& jack) {
@@ -357,15 +358,15 @@ Result<AudioDevice> open_jack(Process& process, const AudioOptions& options) {
   }
   describe_ports(*jack);
   jack->wiring = options.wiring;
-  if (options.connect) {
-    connect(*jack);
+  AudioDevice device;
+  if (options.connect && !connect(*jack)) {
+    device.note = "--connect found no physical outputs, so nothing is heard; connect '" +
+                  std::string(jack_port_name(jack->outputs[0])) + "' by hand";
   }
   update_wiring(*jack, true);
-  AudioDevice device;
   device.rate_hz = jack->rate_hz;
   device.description = "JACK client '" + std::string(jack_get_client_name(jack->client)) + "', " +
-                       std::to_string(static_cast<int>(jack->rate_hz)) + " Hz, " +
-                       std::to_string(jack_get_buffer_size(jack->client)) + " frames";
+                       std::to_string(static_cast<int>(jack->rate_hz)) + " Hz";
   device.priority = jack_client_real_time_priority(jack->client);
   device.has_midi = true;
   device.running = std::move(running);
