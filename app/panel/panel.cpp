@@ -26,8 +26,6 @@ namespace {
 using Request = httplib::Request;
 using Response = httplib::Response;
 
-// Each motion or event stream occupies a thread for as long as it is open.
-constexpr std::size_t threads = 2 * WebPanel::most_viewers + 4;
 constexpr std::size_t most_news = 100;
 constexpr double fastest_hz = 60.0;
 constexpr double usual_hz = 30.0;
@@ -118,6 +116,33 @@ class News {
   std::uint64_t count_ = 0;  // Number of messages so far.
 };
 
+// A thread for each connection: one that says nothing, or streams, does not keep others waiting.
+class Connections : public httplib::TaskQueue {
+ public:
+  void enqueue(std::function<void()> serve) override {
+    constexpr std::size_t most = 512;
+    std::unique_lock lock(mutex_);
+    ended_.wait(lock, [&] { return open_ < most; });
+    ++open_;
+    std::thread([this, serve = std::move(serve)] {
+      serve();
+      const std::lock_guard end(mutex_);
+      --open_;
+      ended_.notify_all();
+    }).detach();
+  }
+
+  void shutdown() override {
+    std::unique_lock lock(mutex_);
+    ended_.wait(lock, [&] { return open_ == 0; });
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable ended_;
+  std::size_t open_ = 0;
+};
+
 }  // namespace
 
 struct WebPanel::Server {
@@ -128,7 +153,7 @@ struct WebPanel::Server {
         session(session_in),
         motion(motion_in),
         osc(osc_in) {
-    http.new_task_queue = [] { return new httplib::ThreadPool(threads); };
+    http.new_task_queue = [] { return new Connections; };
     http.set_keep_alive_max_count(1);
     http.set_keep_alive_timeout(1);  // Browsers open connections ahead of time and leave them idle.
     http.set_read_timeout(idle_s);

@@ -2,6 +2,7 @@
 #include "app/panel/panel.h"
 
 #include <arpa/inet.h>
+#include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -216,6 +217,22 @@ TEST_CASE("requests that a foreign page could make are refused", "[panel_http]")
   CHECK(page.find("Access-Control") == page.npos);
   CHECK(page.find("Content-Type: text/html; charset=utf-8") != page.npos);
   CHECK(page.find("Set-Cookie") == page.npos);
+}
+
+// They are closed after idle_s without another byte; the page must not wait for that.
+TEST_CASE("half-open connections do not keep the page away", "[panel_http]") {
+  Stage stage;
+  std::vector<int> silent;
+  for (int i = 0; i < 300; ++i) {
+    silent.push_back(stage.connect());
+    Stage::send(silent.back(), "GET / HTTP/1.1\r\n");
+  }
+  CHECK(stage.status(stage.get("/")) == 200);
+  pollfd newest{silent.back(), POLLIN, 0};
+  CHECK(poll(&newest, 1, 0) == 0);  // It is still open.
+  for (const int socket : silent) {
+    close(socket);
+  }
 }
 
 TEST_CASE("a request body must have a known, small length", "[panel_http]") {
