@@ -102,6 +102,8 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
   add_budget(*command, options.budget);
   add_motion(*command, options.third);
   add_force(*command, options.force);
+  command->add_flag("--paused", options.is_paused,
+                    "let the MIDI file wait for 'song play' or /song/play");
   command->add_flag("-i,--no-console", options.no_console, "do not read console commands");
   command->add_option("-e,--execute", options.script, "file of console commands to run first")
       ->type_name("FILE");

@@ -34,6 +34,7 @@ struct PlayOptions {
   KeyOptions keys;                     // override every preset's
   bool force = false;                  // plays the first model even if it is unstable
   bool no_console = false;
+  bool is_paused = false;  // the MIDI file waits for the command `song play`
   std::string script;
   OscOptions osc;  // port 0: none
   PanelOptions panel;

@@ -41,6 +41,10 @@ Result<TuneTarget> tune_target(std::span<const Argument> arguments);
 // Parses the pairs FIGURE VALUE of a target timbre.
 Result<std::vector<TimbreTarget>> timbre_targets(std::span<const Argument> arguments);
 
+// Controls the MIDI file that plays: WORD [NUMBER]..., where WORD is play, pause, tempo or loop.
+Result<Done> control_song(Session& session, const std::string& word,
+                          std::span<const Argument> numbers);
+
 namespace command {
 Result<Done> keys(ConsoleContext& console, Words words);
 Result<Done> load(ConsoleContext& console, Words words);
@@ -52,6 +56,7 @@ Result<Done> save(ConsoleContext& console, Words words);
 Result<Done> learn(ConsoleContext& console, Words words);
 Result<Done> unlearn(ConsoleContext& console, Words words);
 Result<Done> undo(ConsoleContext& console, Words words);
+Result<Done> song(ConsoleContext& console, Words words);
 Result<Done> wait(ConsoleContext& console, Words words);
 Result<Done> control(ConsoleContext& console, Words words);
 Result<Done> params(ConsoleContext& console, Words words);

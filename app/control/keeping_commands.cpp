@@ -101,6 +101,43 @@ Result<Done> command::undo(ConsoleContext& console, Words) {
   return Done{};
 }
 
+Result<Done> control_song(Session& session, const std::string& word,
+                          std::span<const Argument> numbers) {
+  std::vector<double> given;
+  for (const Argument& number : numbers) {
+    if (!std::holds_alternative<double>(number)) {
+      return Error{"expected a number, found '" + std::get<std::string>(number) + "'"};
+    }
+    given.push_back(std::get<double>(number));
+  }
+  Song& song = session.song();
+  if (word == "play" && given.size() <= 1) {
+    return song.play(given.empty() ? std::nullopt : std::optional(given[0]));
+  }
+  if (word == "pause" && given.size() <= 1) {  // also a button's value
+    return song.pause();
+  }
+  if (word == "tempo" && given.size() == 1) {
+    return song.set_tempo(given[0] / 100.0);
+  }
+  if (word == "loop" && given.size() != 1 && given.size() <= 2) {
+    return given.empty() ? song.loop(0.0, 0.0) : song.loop(given[0], given[1]);
+  }
+  return Error{"expected play [SECONDS], pause, tempo PERCENT, or loop [FROM TO]"};
+}
+
+Result<Done> command::song(ConsoleContext& console, Words words) {
+  std::vector<Argument> numbers;
+  for (const std::string& word : words.subspan(1)) {
+    numbers.push_back(to_argument(word));
+  }
+  auto done = control_song(console.session, words[0], numbers);
+  if (done) {
+    console.print(console.session.song().description());
+  }
+  return done;
+}
+
 Result<Done> command::wait(ConsoleContext& console, Words words) {
   constexpr double longest_s = 3600.0;
   double time_s = 0.0;

@@ -496,6 +496,27 @@ std::vector<Row> make_rows() {
            "The extension selects the format: .wav, .w64, .flac, .ogg, .aiff, .au or .caf, with 24 "
            "bits per\nsample at the current rate. --force overwrites an existing file.",
        .act = command::record},
+      {.address = "/song/play",
+       .arguments = {{"SECONDS", "the second", 0, 86400, 0}},
+       .does = "plays the MIDI file, from this second of it or from where it is",
+       .answer = answer::song,
+       .command = "song",
+       .group = CommandGroup::playing,
+       .words = "play|pause|tempo|loop [NUMBER] [NUMBER]",
+       .command_does = "plays, pauses or repeats the MIDI file of --midi",
+       .details =
+           "song play [SECONDS] continues, or plays from this second; song tempo PERCENT, 10 "
+           "to 1000;\nsong loop FROM TO repeats these seconds, song loop ends that.",
+       .act = command::song},
+      {.address = "/song/pause", .does = "pauses the MIDI file", .answer = answer::song},
+      {.address = "/song/tempo",
+       .arguments = {{"PERCENT", "the tempo", 10, 1000}},
+       .does = "sets the tempo of the MIDI file, in percent of its own",
+       .answer = answer::song},
+      {.address = "/song/loop",
+       .arguments = {{"FROM", "the first second", 0, 86400, 0}, {"TO", "the last", 0, 86400, 0}},
+       .does = "repeats these seconds of the MIDI file; without numbers, no longer",
+       .answer = answer::song},
       {.address = "/flight/save",
        .arguments = {{.word = "NAME", .is_text = true}},
        .does =

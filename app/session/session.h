@@ -16,6 +16,7 @@
 #include "app/session/engine_supply.h"
 #include "app/session/flight/flight_recorder.h"
 #include "app/session/scene_builder.h"
+#include "app/session/song.h"
 #include "app/session/timbre/timbre_watch.h"
 #include "app/session/watch/scene_watch.h"
 #include "app/session/work_queue.h"
@@ -121,6 +122,7 @@ class Session {
   void set_backend(std::string description, bool runs);
 
   TimbreWatch& timbre() { return timbre_; }
+  Song& song() { return song_; }
 
   Reload last_reload() const { return watch_.last_reload(); }
 
@@ -147,6 +149,7 @@ class Session {
   EngineSupply engines_;
   SceneWatch watch_;
   TimbreWatch timbre_;
+  Song song_;
 
   mutable std::mutex mutex_;  // guards the four below
   Peaks peaks_;

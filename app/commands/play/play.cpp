@@ -146,7 +146,8 @@ class Player {
     if (song) {
       voice_.say("playing " + counted(song->messages.size(), "message", "messages") + " of MIDI, " +
                  fixed(song->length_s, 1) + " s");
-      player_.emplace(*std::move(song), door_);
+      session_->song().begin(song->length_s, options_.is_paused);
+      player_.emplace(*std::move(song), door_, session_->song());
     }
     return converse();
   }
@@ -502,7 +503,7 @@ class Player {
           return exit_code::done;
         }
       }
-      if (options_.no_console && player_ && player_->is_over() && has_fallen_silent()) {
+      if (options_.no_console && player_ && session_->song().is_over() && has_fallen_silent()) {
         return exit_code::done;
       }
       device_.tick();

@@ -363,6 +363,15 @@ void answer::timbre(const Query& query) {
   }
 }
 
+void answer::song(const Query& query) {
+  const std::string& address = query.message.address;
+  const auto done =
+      control_song(query.session, address.substr(address.rfind('/') + 1), query.message.arguments);
+  query.client.answer(Reply(done ? "/done" : "/fail")
+                          .text(address)
+                          .text(done ? query.session.song().description() : done.error().message));
+}
+
 void answer::unsubscribe(const Query& query) {
   const auto client = receiver(query, 0);
   if (!client) {

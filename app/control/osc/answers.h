@@ -48,6 +48,9 @@ void shape(const Query& query);
 void subscribe(const Query& query);
 void unsubscribe(const Query& query);
 
+// Replies /done s:address s:description, or /fail s:address s:reason.
+void song(const Query& query);
+
 // Replies /timbre.reply f:seconds, and then the messages of Subscribers.
 void timbre(const Query& query);
 

@@ -1,0 +1,107 @@
+// A MIDI file that is paused, moved, slowed down and repeated while it plays.
+#include "app/commands/smf/midi_player.h"
+#include "tests/support/app/console_harness.h"
+
+namespace ressort::song_test {
+namespace {
+
+// Keys 60, 61 and 62 at these seconds, each for a tenth of a second; controller 74 before the last.
+MidiFile three_notes(std::array<double, 3> times_s) {
+  MidiFile file;
+  const auto add = [&](double time_s, std::array<std::uint8_t, 3> bytes) {
+    file.messages.push_back({time_s, static_cast<std::uint32_t>(file.bytes.size()), 3});
+    file.bytes.insert(file.bytes.end(), bytes.begin(), bytes.end());
+  };
+  for (std::uint8_t i = 0; i < 3; ++i) {
+    if (i == 2) {
+      add(times_s[i] - 0.001, {0xb0, 74, 127});
+    }
+    add(times_s[i], {0x90, static_cast<std::uint8_t>(60 + i), 100});
+    add(times_s[i] + 0.1, {0x80, static_cast<std::uint8_t>(60 + i), 0});
+  }
+  file.length_s = times_s[2] + 0.1;
+  return file;
+}
+
+struct Stage {
+  Harness harness;
+  MidiSink door{harness.process};
+  MidiPlayer player;
+
+  explicit Stage(std::array<double, 3> times_s)
+      : player(begun(harness.session.song(), three_notes(times_s)), door, harness.session.song()) {}
+  static MidiFile begun(Song& song, MidiFile file) {
+    song.begin(file.length_s, false);
+    return file;
+  }
+
+  // Plays until this is true, for at most 20 s.
+  template <class True>
+  bool plays_until(True&& is_true) {
+    for (int i = 0; i < 20000 && !is_true(); ++i) {
+      harness.play();
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return is_true();
+  }
+  std::uint64_t notes() { return harness.process.meters().notes; }
+  int last_key() { return harness.process.meters().last_notes[(notes() - 1) % 4].key; }
+};
+
+}  // namespace
+
+TEST_CASE("a song is moved and paused", "[song]") {
+  Stage stage({0.0, 100.0, 200.0});
+  Harness& h = stage.harness;
+  REQUIRE(stage.plays_until([&] { return stage.notes() == 1; }));
+  CHECK(has(h.say("song play 100"), "playing at 100.0 of 200.1 s, tempo 100 %"));
+  REQUIRE(stage.plays_until([&] { return stage.notes() == 2; }));
+  CHECK(stage.last_key() == 61);
+  CHECK(has(h.say("song pause"), "paused at 100."));
+  CHECK(has(h.say("song play 200"), "playing at 200.0"));
+  REQUIRE(stage.plays_until([&] { return h.session.song().is_over(); }));
+  REQUIRE(stage.plays_until([&] { return stage.notes() == 3; }));
+  CHECK(stage.last_key() == 62);
+  CHECK(has(h.say("song play"), "playing at 0.0"));  // It was over.
+  REQUIRE(stage.plays_until([&] { return stage.notes() == 4; }));
+  CHECK(stage.last_key() == 60);
+}
+
+TEST_CASE("a song is repeated at another tempo", "[song]") {
+  Stage stage({0.0, 0.2, 100.0});
+  Harness& h = stage.harness;
+  CHECK(has(h.say("song tempo 1000"), "tempo 1000 %"));
+  CHECK(has(h.say("song loop 0.15 0.4"), "loop from 0.15 to 0.4 s"));
+  // Without the loop there are three notes.
+  REQUIRE(stage.plays_until([&] { return stage.notes() >= 8; }));
+  CHECK(stage.last_key() == 61);
+  h.say("song loop");
+  CHECK(has(h.say("song play 99.9"), "tempo 1000 %"));
+  REQUIRE(stage.plays_until([&] { return h.session.song().is_over(); }));
+}
+
+// The position of a song is its tempo times the time that has passed.
+TEST_CASE("a song's position follows its tempo", "[song]") {
+  Song::State state{.plays = true, .at_s = 10.0, .tempo = 2.0};
+  const auto later = state.at + std::chrono::seconds(3);
+  CHECK(state.position_s(later) == Approx(16.0).margin(1e-9));
+  CHECK(state.time_of(16.0) == later);
+  state.plays = false;
+  CHECK(state.position_s(later) == 10.0);
+}
+
+TEST_CASE("a wrong command of a song is an error", "[song]") {
+  Harness h;
+  CHECK(has(h.say("song play"), "no MIDI file was given"));
+  Stage stage({0.0, 100.0, 200.0});
+  for (const char* const line :
+       {"song stop", "song tempo", "song tempo 5", "song tempo fast", "song loop 3",
+        "song loop 3 3.001", "song loop 5 3", "song play -1", "song play 1 2"}) {
+    INFO(line);
+    CHECK(has(stage.harness.say(line), "expected") + has(stage.harness.say(line), "must lie") +
+              has(stage.harness.say(line), "needs its first") >
+          0);
+  }
+}
+
+}  // namespace ressort::song_test
