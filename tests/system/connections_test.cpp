@@ -77,6 +77,17 @@ TEST_CASE("Ports have names and an order", "[jack_midi]") {
   jack_client_close(client);
 }
 
+TEST_CASE("A server without outputs is told to those who ask for a connection", "[server_loss]") {
+  for (const int speakers : {2, 0}) {
+    const Server server(256, 48000, true, speakers);
+    Child play(program({"play", "PolyTriangle", "-a", "jack", "-i", "-u", osc_port, "--connect"}));
+    REQUIRE(answers());
+    CHECK((play.said().find("found no physical outputs") != std::string::npos) == (speakers == 0));
+    play.signal(SIGTERM);
+    CHECK(play.exit_code() == 0);
+  }
+}
+
 TEST_CASE("The program survives the end of its server, or reports it by the exit code",
           "[server_loss]") {
   auto server = std::make_unique<Server>(256);

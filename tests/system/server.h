@@ -152,13 +152,15 @@ class Server {
   // While a program waits for this server, pass `is_awaited = false` and await the program's own
   // message. A client that closes while another one opens can leave its semaphore in that other
   // client (JACK 1.9.21), and the next client in the same slot then never runs.
-  explicit Server(int period_frames, int rate_hz = 48000, bool is_awaited = true) {
+  explicit Server(int period_frames, int rate_hz = 48000, bool is_awaited = true,
+                  int speakers = 2) {
     use_test_server();
     // Output to a full pipe would block the server.
     jackd_ = std::make_unique<Child>(std::vector<std::string>{
         "sh", "-c",
         "exec jackd -r -n " + std::string(server_name) + " -d dummy -r " + std::to_string(rate_hz) +
-            " -p " + std::to_string(period_frames) + " > /dev/null 2>&1"});
+            " -p " + std::to_string(period_frames) + " -P " + std::to_string(speakers) +
+            " > /dev/null 2>&1"});
     if (!is_awaited) {
       return;
     }
