@@ -36,7 +36,7 @@ using Place = std::vector<double>;  // [free parameter] 0 to 1.
 
 class MeterReader {
  public:
-  MeterReader(const TimbreModel& model, std::span<const double> values,
+  MeterReader(const FiguresAt& model, std::span<const double> values,
               std::span<const FreeParameter> free, std::span<const TimbreTarget> targets,
               const Progress& progress)
       : model_(model),
@@ -88,18 +88,11 @@ class MeterReader {
     return place;
   }
 
-  Result<TargetValues> figures_before() const { return model_.figures(values_); }
+  Result<TargetValues> figures_before() const { return model_(values_); }
 
   // Stores an error in `error`.
   std::optional<Trial> trial(const Place& place) {
-    return trial(place, model_.figures(values_at(place)));
-  }
-
-  std::optional<Trial> trial_near(const Place& at, const Place& place) {
-    return model_.near ? trial(place, model_.near(values_at(at), values_at(place))) : trial(place);
-  }
-
-  std::optional<Trial> trial(const Place& place, const Result<TargetValues>& found) {
+    const Result<TargetValues> found = model_(values_at(place));
     ++trials;
     progress_.spend(std::size_t{1} << 17);  // Counts the cost of one evaluation.
     if (!found) {
@@ -132,7 +125,7 @@ class MeterReader {
         if (moved == 0.0) {
           continue;
         }
-        if (const auto there = trial_near(at.place, place)) {
+        if (const auto there = trial(place)) {
           for (std::size_t t = 0; t < targets_.size(); ++t) {
             slopes(t, i) = (there->noticed[t] - at.noticed[t]) / moved;
           }
@@ -278,7 +271,7 @@ class MeterReader {
     return place == at.place ? std::nullopt : std::optional(place);
   }
 
-  const TimbreModel& model_;
+  const FiguresAt& model_;
   std::vector<double> values_;
   std::span<const FreeParameter> free_;
   std::span<const TimbreTarget> targets_;
@@ -301,7 +294,7 @@ std::optional<Error> wrong_target(const TimbreTarget& target) {
 // exact model, which is slower.
 class Search {
  public:
-  Search(const TimbreModel& model, std::span<const double> values,
+  Search(const FiguresAt& model, std::span<const double> values,
          std::span<const FreeParameter> free, std::span<const TimbreTarget> targets,
          const TimbreSearchOptions& options)
       : options_(options),
@@ -433,14 +426,11 @@ class Search {
 
 }  // namespace
 
-TimbreModel timbre_model(StruckModel& model, StruckAs how) {
-  return {[&model, how](std::span<const double> at) { return model.figures(at, how); },
-          [&model, how](std::span<const double> place, std::span<const double> at) {
-            return model.figures_near(place, at, how);
-          }};
+FiguresAt timbre_model(StruckModel& model, StruckAs how) {
+  return [&model, how](std::span<const double> at) { return model.figures(at, how); };
 }
 
-Result<FoundTimbre> find_timbre(const TimbreModel& model, std::span<const double> values,
+Result<FoundTimbre> find_timbre(const FiguresAt& model, std::span<const double> values,
                                 std::span<const FreeParameter> free,
                                 std::span<const TimbreTarget> targets,
                                 const TimbreSearchOptions& options) {

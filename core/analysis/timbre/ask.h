@@ -29,21 +29,12 @@ struct FreeParameter {
 // Computes the figures of a model for these parameters, or an error.
 using FiguresAt = std::function<Result<TargetValues>(std::span<const double> parameters)>;
 
-// Computes the same to first order around `place`.
-using FiguresNear = std::function<Result<TargetValues>(std::span<const double> place,
-                                                       std::span<const double> parameters)>;
-
-struct TimbreModel {
-  FiguresAt figures;
-  FiguresNear near = {};  // Used for slopes; without it `figures` is used.
-};
-
 // Wraps a struck model, which must outlive the result.
-TimbreModel timbre_model(StruckModel& model, StruckAs how);
+FiguresAt timbre_model(StruckModel& model, StruckAs how);
 
 struct TimbreSearchOptions {
   int starts = 8;  // The first start is the current parameters, the others are random.
-  std::optional<TimbreModel> exactly;  // Refines and judges the best result, if given.
+  std::optional<FiguresAt> exactly;    // Refines and judges the best result, if given.
   std::uint64_t seed = 1;              // Seed of the random starts.
   std::function<void(double share)> on_progress =
       {};  // Reports progress from 0 to 1 as starts finish.
@@ -72,7 +63,7 @@ struct FoundTimbre {
 // `exactly`. `values` are the current parameters. Fails if nothing is free, a target is invalid,
 // the model lacks a figure at its current parameters, or the search is stopped (`stopped`).
 // O(starts * steps * parameters) evaluations.
-Result<FoundTimbre> find_timbre(const TimbreModel& model, std::span<const double> values,
+Result<FoundTimbre> find_timbre(const FiguresAt& model, std::span<const double> values,
                                 std::span<const FreeParameter> free,
                                 std::span<const TimbreTarget> targets,
                                 const TimbreSearchOptions& options);

@@ -123,37 +123,18 @@ double jnd_between(TargetFigure figure, double value, double target) {
 StruckModel::StruckModel(const Network& network, const StrikeOptions& options)
     : network_(expand_macros(network)), options_(options) {}
 
-// Uses the known shapes if they are exact; near a place, first-order perturbation of the place.
+// Uses the known shapes if they are exact. Otherwise solves for the modes and keeps their shapes.
 Result<std::vector<HeardMode>> StruckModel::modes_at(std::span<const double> parameters,
-                                                     double factor, const Place& place) {
+                                                     double factor) {
   const Network written = evaluated(network_, parameters);
-  const ModeOptions how = mode_options(factor);
+  const ModeOptions how{
+      .rate_hz = options_.rate_hz, .key_factor = factor, .progress = options_.progress};
   const LinearSystem system = make_linear_system(written, scheme_step(how), true, factor);
   if (known_ && system.is_sound) {
-    if (auto modes = known_->exactly(system)) {
+    if (auto modes = known_->modes_of(system)) {
       return *std::move(modes);
     }
   }
-  if (!place) {
-    return found_modes(written, parameters, how);
-  }
-  if (!std::equal(place->begin(), place->end(), known_at_.begin(), known_at_.end())) {
-    if (auto there = found_modes(evaluated(network_, *place), *place, how); !there) {
-      return there.error();
-    }
-  }
-  auto modes = known_ && system.is_sound ? known_->nearly(system) : std::nullopt;
-  if (modes) {
-    return *std::move(modes);
-  }
-  const auto found = find_modes(written, parameters, how);
-  return found ? Result<std::vector<HeardMode>>(heard_modes(*found, pushed())) : found.error();
-}
-
-// Solves for the modes and keeps them as the known ones.
-Result<std::vector<HeardMode>> StruckModel::found_modes(const Network& written,
-                                                        std::span<const double> parameters,
-                                                        const ModeOptions& how) {
   auto found = find_modes(written, parameters, how);
   if (!found) {
     return found.error();
@@ -163,15 +144,10 @@ Result<std::vector<HeardMode>> StruckModel::found_modes(const Network& written,
   }
   std::vector<HeardMode> modes = heard_modes(*found, pushed());
   known_.reset();
-  known_at_.assign(parameters.begin(), parameters.end());
   if (found->basis.rows() > 0) {
     known_.emplace(*std::move(found), pushed(), how);
   }
   return modes;
-}
-
-ModeOptions StruckModel::mode_options(double factor) const {
-  return {.rate_hz = options_.rate_hz, .key_factor = factor, .progress = options_.progress};
 }
 
 std::vector<std::size_t> StruckModel::pushed() const {
@@ -182,11 +158,10 @@ std::vector<std::size_t> StruckModel::pushed() const {
   return inputs;
 }
 
-Result<StruckModel::Tuned> StruckModel::tuned(std::span<const double> parameters,
-                                              const Place& place) {
+Result<StruckModel::Tuned> StruckModel::tuned(std::span<const double> parameters) {
   double factor = factor_;
   for (int i = 0; i < most_tunings; ++i) {
-    auto modes = modes_at(parameters, factor, place);
+    auto modes = modes_at(parameters, factor);
     if (!modes) {
       return modes.error();
     }
@@ -310,7 +285,7 @@ std::optional<TemporalShape> StruckModel::rising(const Tuned& tuned, StruckAs ho
 }
 
 std::optional<double> StruckModel::attack_ms(std::span<const double> parameters) {
-  const auto found = tuned(parameters, {});
+  const auto found = tuned(parameters);
   return found ? attack_of(*found, StruckAs::samples) : std::nullopt;
 }
 
@@ -324,13 +299,7 @@ std::optional<double> StruckModel::attack_of(const Tuned& tuned, StruckAs how) c
 }
 
 Result<TargetValues> StruckModel::figures(std::span<const double> parameters, StruckAs how) {
-  const auto found = tuned(parameters, {});
-  return found ? figures_of(*found, how) : found.error();
-}
-
-Result<TargetValues> StruckModel::figures_near(std::span<const double> place,
-                                               std::span<const double> parameters, StruckAs how) {
-  const auto found = tuned(parameters, place);
+  const auto found = tuned(parameters);
   return found ? figures_of(*found, how) : found.error();
 }
 

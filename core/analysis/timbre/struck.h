@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/analysis/modes/nearby_modes.h"
+#include "core/analysis/modes/known_shapes.h"
 #include "core/analysis/timbre/descriptors.h"
 #include "core/analysis/timbre/frame_analysis.h"
 #include "core/analysis/timbre/modal_sound.h"
@@ -102,11 +102,6 @@ class StruckModel {
   // parameters had modes of the same shapes.
   Result<TargetValues> figures(std::span<const double> parameters, StruckAs how);
 
-  // Returns the same to first order around `place`, for slopes. The first call for a place takes
-  // O(masses^3), later ones O(masses^2) unless the change splits degenerate modes.
-  Result<TargetValues> figures_near(std::span<const double> place,
-                                    std::span<const double> parameters, StruckAs how);
-
   // Returns the attack of figures() by samples, whether or not `has_attack` is set; empty if there
   // are no figures.
   std::optional<double> attack_ms(std::span<const double> parameters);
@@ -118,14 +113,8 @@ class StruckModel {
     std::vector<HeardMode> modes;  // A residue for each strike.
     double factor = 1.0;
   };
-  using Place = std::optional<std::span<const double>>;  // The place near which modes are wanted.
-  Result<Tuned> tuned(std::span<const double> parameters, const Place& place);
-  Result<std::vector<HeardMode>> modes_at(std::span<const double> parameters, double factor,
-                                          const Place& place);
-  Result<std::vector<HeardMode>> found_modes(const Network& written,
-                                             std::span<const double> parameters,
-                                             const ModeOptions& how);
-  ModeOptions mode_options(double factor) const;
+  Result<Tuned> tuned(std::span<const double> parameters);
+  Result<std::vector<HeardMode>> modes_at(std::span<const double> parameters, double factor);
   std::vector<std::size_t> pushed() const;
   Result<TargetValues> figures_of(const Tuned& tuned, StruckAs how) const;
   FrameTimbre lines_of(std::span<const DecayingPartial> partials, double f0_hz) const;
@@ -138,8 +127,7 @@ class StruckModel {
   Network network_;
   StrikeOptions options_;
   double factor_ = 1.0;               // Stiffness factor of the last key; 1 without a key.
-  std::optional<NearbyModes> known_;  // The shapes that were found last.
-  std::vector<double> known_at_;      // Their parameters.
+  std::optional<KnownShapes> known_;  // The shapes that were found last.
 };
 
 }  // namespace ressort::analysis
