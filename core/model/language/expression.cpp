@@ -57,33 +57,19 @@ class Parser {
   }
 
  private:
-  void sum() {
-    product();
-    while (!failed_) {
-      if (accept('+')) {
-        product();
-        push_operator(Op::add);
-      } else if (accept('-')) {
-        product();
-        push_operator(Op::subtract);
-      } else {
-        return;
-      }
-    }
-  }
+  void sum() { joined('+', Op::add, '-', Op::subtract, &Parser::product); }
+  void product() { joined('*', Op::multiply, '/', Op::divide, &Parser::factor); }
 
-  void product() {
-    factor();
+  // Parses operands with one of two operators between them, from left to right.
+  void joined(char one, Op first, char other, Op second, void (Parser::*operand)()) {
+    (this->*operand)();
     while (!failed_) {
-      if (accept('*')) {
-        factor();
-        push_operator(Op::multiply);
-      } else if (accept('/')) {
-        factor();
-        push_operator(Op::divide);
-      } else {
+      const bool is_first = accept(one);
+      if (!is_first && !accept(other)) {
         return;
       }
+      (this->*operand)();
+      push({is_first ? first : second, 0, 0.0}, -1);
     }
   }
 
@@ -190,8 +176,6 @@ class Parser {
     fail("unknown function " + quoted(word) +
          "; known functions: sqrt abs sin cos exp pow min max clamp");
   }
-
-  void push_operator(Op op) { push({op, 0, 0.0}, -1); }
 
   void push(Step step, int growth) {
     if (failed_) {
