@@ -2,7 +2,6 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <numbers>
 #include <optional>
 
 #include "core/solids/solid_mesh.h"
@@ -37,18 +36,15 @@ class Numbers {
     return static_cast<std::size_t>(*number);
   }
 
-  // Moves behind the next line that equals `line`.
-  bool find(std::string_view line) {
-    for (std::size_t from = at_; from < text_.size();) {
-      const std::size_t found = text_.find(line, from);
-      if (found == std::string_view::npos) {
-        return false;
-      }
-      if (found == 0 || text_[found - 1] == '\n') {
-        at_ = found + line.size();
+  // Moves behind the next line that begins with this word.
+  bool find(std::string_view word) {
+    for (std::size_t found = text_.find(word, at_); found != text_.npos;
+         found = text_.find(word, found + 1)) {
+      const std::size_t before = text_.substr(0, found).find_last_not_of(" \t");
+      if (before == text_.npos || text_[before] == '\n') {
+        at_ = found + word.size();
         return true;
       }
-      from = found + 1;
     }
     return false;
   }
@@ -75,22 +71,6 @@ class Numbers {
 
   std::string_view text_;
   std::size_t at_ = 0;
-};
-
-// Maps the point numbers of a file to indices.
-struct Numbering {
-  std::vector<int> place;
-
-  bool add(std::size_t number, int point) {
-    if (number >= place.size()) {
-      place.resize(std::max<std::size_t>(number + 1, 2 * place.size()), -1);
-    }
-    return place[number] < 0 && (place[number] = point, true);
-  }
-  std::optional<int> find(std::size_t number) const {
-    return number < place.size() && place[number] >= 0 ? std::optional(place[number])
-                                                       : std::nullopt;
-  }
 };
 
 void append_point(std::string& text, const Point3& point) {
@@ -158,117 +138,37 @@ std::string as_smesh(const ClosedSurface& closed) {
   return text + "0\n";
 }
 
-Result<TetrahedronMesh> read_gmsh(std::string_view text) {
+Result<TetrahedronMesh> read_medit(std::string_view text) {
   Numbers numbers(text);
   TetrahedronMesh mesh;
-  Numbering numbering;
-  if (!numbers.find("$Nodes")) {
-    return numbers.error("a line $Nodes");
-  }
-  const auto points = numbers.count(most_rows);
+  const auto points = numbers.find("Vertices") ? numbers.count(most_rows) : std::nullopt;
   if (!points) {
-    return numbers.error("the number of points");
+    return numbers.error("a line 'Vertices' and their number");
   }
   for (std::size_t i = 0; i < *points; ++i) {
-    const auto number = numbers.count(most_rows);
     const auto x = numbers.next();
     const auto y = numbers.next();
     const auto z = numbers.next();
-    if (!number || !x || !y || !z || !numbering.add(*number, static_cast<int>(i))) {
-      return numbers.error("the number of a point and its three coordinates");
+    if (!x || !y || !z || !numbers.next()) {
+      return numbers.error("three coordinates of a point and its reference");
     }
     mesh.points.push_back({*x, *y, *z});
   }
-  if (!numbers.find("$Elements")) {
-    return numbers.error("a line $Elements");
-  }
-  const auto elements = numbers.count(most_rows);
+  const auto elements = numbers.find("Tetrahedra") ? numbers.count(most_rows) : std::nullopt;
   if (!elements) {
-    return numbers.error("the number of elements");
+    return numbers.error("a line 'Tetrahedra' and their number");
   }
   for (std::size_t i = 0; i < *elements; ++i) {
-    // A row has the element's number, its type, the number of tags, the tags, and the points.
-    // Types: 15 point, 1 line, 2 triangle, 4 tetrahedron.
-    const auto number = numbers.count(most_rows);
-    const auto kind = numbers.count(100);
-    const auto tags = numbers.count(100);
-    const std::size_t corners = !kind         ? 0
-                                : *kind == 15 ? 1
-                                : *kind == 1  ? 2
-                                : *kind == 2  ? 3
-                                : *kind == 4  ? 4
-                                              : 0;
-    if (!number || !tags || corners == 0) {
-      return numbers.error("an element: its number, its kind 15, 1, 2 or 4, its tags");
-    }
-    for (std::size_t tag = 0; tag < *tags; ++tag) {
-      if (!numbers.next()) {
-        return numbers.error("a tag");
-      }
-    }
-    Tetrahedron tetrahedron{};
-    for (std::size_t k = 0; k < corners; ++k) {
-      const auto corner = numbers.count(most_rows);
-      const auto place = corner ? numbering.find(*corner) : std::nullopt;
-      if (!place) {
-        return numbers.error("the number of an existing point");
-      }
-      tetrahedron[k] = *place;
-    }
-    if (corners == 4) {
-      mesh.tetrahedra.push_back(tetrahedron);
-    }
-  }
-  return mesh;
-}
-
-Result<TetrahedronMesh> read_tetgen(std::string_view nodes, std::string_view elements) {
-  TetrahedronMesh mesh;
-  Numbering numbering;
-  Numbers numbers(nodes);
-  const auto points = numbers.count(most_rows);
-  const auto dimension = numbers.count(3);
-  const auto attributes = numbers.count(100);
-  const auto marks = numbers.count(1);
-  if (!points || !dimension || *dimension != 3 || !attributes || !marks) {
-    return numbers.error("the number of points, 3, and the number of attributes");
-  }
-  for (std::size_t i = 0; i < *points; ++i) {
-    const auto number = numbers.count(most_rows);
-    const auto x = numbers.next();
-    const auto y = numbers.next();
-    const auto z = numbers.next();
-    bool has_rest = true;
-    for (std::size_t k = 0; k < *attributes + *marks; ++k) {
-      has_rest = numbers.next() && has_rest;
-    }
-    if (!number || !x || !y || !z || !has_rest || !numbering.add(*number, static_cast<int>(i))) {
-      return numbers.error("the number of a point and its three coordinates");
-    }
-    mesh.points.push_back({*x, *y, *z});
-  }
-  Numbers rows(elements);
-  const auto count = rows.count(most_rows);
-  const auto corners = rows.count(10);
-  const auto regions = rows.count(100);
-  if (!count || !corners || *corners != 4 || !regions) {
-    return rows.error("the number of tetrahedra, 4, and the number of attributes");
-  }
-  for (std::size_t i = 0; i < *count; ++i) {
-    const auto number = rows.count(most_rows);
     Tetrahedron tetrahedron{};
     for (int& corner : tetrahedron) {
-      const auto found = rows.count(most_rows);
-      const auto place = found ? numbering.find(*found) : std::nullopt;
-      if (!number || !place) {
-        return rows.error("the number of a tetrahedron and its four points");
+      const auto number = numbers.count(*points);  // Counted from 1.
+      if (!number || *number == 0) {
+        return numbers.error("the number of an existing point");
       }
-      corner = *place;
+      corner = static_cast<int>(*number) - 1;
     }
-    for (std::size_t k = 0; k < *regions; ++k) {
-      if (!rows.next()) {
-        return rows.error("the number of a region");
-      }
+    if (!numbers.next()) {
+      return numbers.error("the reference of a tetrahedron");
     }
     mesh.tetrahedra.push_back(tetrahedron);
   }

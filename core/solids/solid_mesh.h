@@ -73,7 +73,7 @@ double edge_length(double volume, double unknowns);
 std::string as_stl(const ClosedSurface& closed);  // ASCII STL with one solid per shell.
 // TetGen's format, with a point in every cavity.
 std::string as_smesh(const ClosedSurface& closed);
-Result<TetrahedronMesh> read_gmsh(std::string_view text);  // Gmsh's .msh format 2, ASCII.
-Result<TetrahedronMesh> read_tetgen(std::string_view nodes, std::string_view elements);
+// Reads the vertices and tetrahedra of Medit's ASCII format, which Gmsh and TetGen write.
+Result<TetrahedronMesh> read_medit(std::string_view text);
 
 }  // namespace ressort::solids

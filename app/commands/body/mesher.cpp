@@ -127,9 +127,7 @@ std::string gmsh_script(double edge, bool makes_surface_anew) {
          "Surface Loop(1) = Surface{:};\nVolume(1) = {1};\n"
          "Mesh.MeshSizeFromPoints = 0;\nMesh.MeshSizeExtendFromBoundary = 1;\n"
          "Mesh.MeshSizeMax = " +
-         print_number(edge) +
-         ";\nMesh.Optimize = 1;\nMesh.MshFileVersion = 2.2;\n"
-         "Mesh.Binary = 0;\nMesh.SaveAll = 1;\n";
+         print_number(edge) + ";\nMesh.Optimize = 1;\nMesh.SaveAll = 1;\n";
 }
 
 using Fill = std::function<Result<TetrahedronMesh>(double edge)>;
@@ -145,11 +143,11 @@ Result<TetrahedronMesh> by_gmsh(const ClosedSurface& closed, double edge,
         return written.error();
       }
     }
-    const auto ran = run({"gmsh", "-3", "body.geo", "-o", "body.msh", "-v", "2", "-nt", "1"},
+    const auto ran = run({"gmsh", "-3", "body.geo", "-o", "body.mesh", "-v", "2", "-nt", "1"},
                          folder, order.limit_s, should_continue);
     if (ran) {
-      const auto text = read_bytes(folder.file("body.msh"), max_mesh_bytes);
-      auto mesh = text ? read_gmsh(*text) : Result<TetrahedronMesh>(text.error());
+      const auto text = read_bytes(folder.file("body.mesh"), max_mesh_bytes);
+      auto mesh = text ? read_medit(*text) : Result<TetrahedronMesh>(text.error());
       if (mesh && !mesh->tetrahedra.empty()) {
         return mesh;
       }
@@ -172,17 +170,14 @@ Result<TetrahedronMesh> by_tetgen(const ClosedSurface& closed, double edge,
     return written.error();
   }
   char switches[64];  // TetGen cannot read exponents here
-  std::snprintf(switches, sizeof switches, "-pq1.4a%.24fQ", edge * edge * edge / 8.5);
+  std::snprintf(switches, sizeof switches, "-pq1.4a%.24fgNEFQ", edge * edge * edge / 8.5);
   if (auto ran = run({"tetgen", switches, "body.smesh"}, folder, order.limit_s, should_continue);
       !ran) {
     return ran.error();
   }
-  const auto nodes = read_bytes(folder.file("body.1.node"), max_mesh_bytes);
-  const auto elements = read_bytes(folder.file("body.1.ele"), max_mesh_bytes);
-  if (!nodes || !elements) {
-    return Error{"tetgen produced no tetrahedra; " + last_words(folder.file("log"))};
-  }
-  return read_tetgen(*nodes, *elements);
+  const auto text = read_bytes(folder.file("body.1.mesh"), max_mesh_bytes);
+  return text ? read_medit(*text)
+              : Error{"tetgen produced no tetrahedra; " + last_words(folder.file("log"))};
 }
 
 std::size_t unknowns_of(const TetrahedronMesh& mesh) {

@@ -142,33 +142,31 @@ TEST_CASE("flat, missing and absent tetrahedra are reported", "[solid_mesh]") {
 
 TEST_CASE("files of meshing programs are read, and faulty ones reported", "[solid_mesh]") {
   const std::string gmsh =
-      "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n7 0 1 0\n4 0 0 1\n"
-      "$EndNodes\n$Elements\n3\n1 15 2 0 1 1\n2 2 2 0 1 1 2 7\n3 4 2 0 1 1 2 7 4\n$EndElements\n";
-  const auto mesh = read_gmsh(gmsh);
+      " MeshVersionFormatted 2\n Dimension\n 3\n Vertices\n 4\n 0 0 0 1\n 1 0 0 2\n 0 1 0 3\n"
+      " 0 0 1 4\n Triangles\n 1\n 1 2 3 1\n Tetrahedra\n 1\n 1 2 3 4 1\n End\n";
+  const auto mesh = read_medit(gmsh);
   REQUIRE(mesh);
   CHECK(mesh->points.size() == 4);
   REQUIRE(mesh->tetrahedra.size() == 1);
   CHECK(mesh->tetrahedra[0] == Tetrahedron{0, 1, 2, 3});
-  const std::string nodes = "4 3 0 0\n 1 0 0 0\n 2 1 0 0\n 3 0 1 0\n 4 0 0 1\n# by tetgen\n";
-  const std::string elements = "1  4  0\n    1    1 2 3 4\n";
-  const auto same = read_tetgen(nodes, elements);
+  const std::string tetgen =
+      "MeshVersionFormatted 1\n\nDimension\n3\n\n# Set of mesh vertices\nVertices\n4\n"
+      "0  0  0    0\n1  0  0    0\n0  1  0    0\n0  0  1    0\n\n# Set of Tetrahedra\n"
+      "Tetrahedra\n1\n  1     2     3     4  0\n\nEnd\n";
+  const auto same = read_medit(tetgen);
   REQUIRE(same);
   CHECK(same->tetrahedra == mesh->tetrahedra);
   // Truncated or corrupted files give a result or an error.
   Random random(9);
   for (int round = 0; round < 2000; ++round) {
-    std::string broken = gmsh;
-    std::string broken_nodes = nodes;
-    std::string broken_elements = elements;
-    for (std::string* text : {&broken, &broken_nodes, &broken_elements}) {
-      const std::size_t place = random.below(text->size());
+    for (std::string broken : {gmsh, tetgen}) {
+      const std::size_t place = random.below(broken.size());
       if (random.below(2) == 0) {
-        text->resize(place);
+        broken.resize(place);
       } else {
-        (*text)[place] = static_cast<char>(random.below(256));
+        broken[place] = static_cast<char>(random.below(256));
       }
-    }
-    for (const auto& read : {read_gmsh(broken), read_tetgen(broken_nodes, broken_elements)}) {
+      const auto read = read_medit(broken);
       if (read) {
         static_cast<void>(quadratic(*read));
       } else {
