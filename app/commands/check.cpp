@@ -316,11 +316,14 @@ void print_report(const Scene& scene, const Compiled& compiled, const Proved& pr
     std::printf("lowest mode %.3f Hz; keys sound up to %.0f Hz, higher keys are silent\n",
                 instrument.mode->frequency_hz, instrument.highest_frequency_hz);
   }
-  std::printf("%s\n", conclusion(scene, proved).c_str());
   const auto hazard =
       choose_schemes(expand_macros(scene.network), {.passive = Passivity::never}).hazard;
   if (!scene.has_preset && hazard) {
-    std::printf("render without notes: %s\n", hazard->message.c_str());
+    std::printf(
+        "played with notes: %s\nrendered without notes: not proved stable, because it is %s\n",
+        conclusion(scene, proved).c_str(), hazard->message.c_str());
+  } else {
+    std::printf("%s\n", conclusion(scene, proved).c_str());
   }
 }
 
