@@ -175,7 +175,7 @@ expect 2 "light.mdl:1:9: error: a mass must be above 0" "$program" check light.m
 expect 2 '"message": "a mass must be above 0' "$program" check light.mdl --json
 model motion.mdl '@m mass 1. 0. 5.\n@g ground 0.\n@r spring @m @g 0.1\n@out1 posOutput @m\n'
 # A contact that is stiff for its mass gains energy as it was published.
-model contact.mdl '@g ground 0.\n@m osc 1. 0.01 0.0001 0. 0.\n@f contact @m @g 0. 5. 1000.\n@o posOutput @m\n'
+model contact.mdl '@g ground 0.\n@m osc 1. 0.01 0.0001 0. 0.\n@f contact @m @g 0. 5. 1000.\n@out1 posOutput @m\n'
 expect 0 "played with notes: stable" "$program" check contact.mdl
 expect 0 "rendered without notes: not proved stable" "$program" check contact.mdl
 expect 0 "motion: the position one sample before" "$program" check motion.mdl
