@@ -299,6 +299,7 @@ std::vector<std::optional<VoiceCurve>> voice_curves(const Network& network, cons
 
 namespace {
 
+// Returns the index of the parameter that the preset adds to the amount of blows.
 std::optional<std::size_t> find_hardness(const Network& network, const Preset& preset) {
   const int found = find_parameter(network, preset.hardness);
   return found < 0 ? std::nullopt : std::optional(static_cast<std::size_t>(found));
@@ -350,8 +351,9 @@ Playing make_playing(const Network& network, const Preset& preset, const Proof& 
 
 namespace {
 
-// Returns the named controllers. Those with a usual meaning come first, in the same order in all
-// presets: brightness, ring, touch, the wheel and space.
+// Returns the named controllers. One that only scales an LFO has the LFO's name. Those with a usual
+// meaning come first, in the same order in all presets: brightness, ring, touch, the wheel and
+// space.
 std::vector<KnobInfo> find_knobs(const Network& network, const Preset& preset) {
   constexpr int usual[] = {74, 71, 16, 1, 91};
   std::vector<KnobInfo> knobs;
@@ -383,6 +385,15 @@ std::vector<KnobInfo> find_knobs(const Network& network, const Preset& preset) {
       knob.rest = input.is_force ? 0.0 : knob.position_of(network.masses[input.mass].position);
     }
     knobs.push_back(std::move(knob));
+  }
+  for (const LfoSetting& lfo : preset.lfos) {
+    const auto is_same = [&](const KnobInfo& knob) { return knob.controller == lfo.number; };
+    if (lfo.by == ControlSource::controller && std::ranges::none_of(knobs, is_same)) {
+      knobs.push_back({.name = lfo.name,
+                       .word = model::word_of(lfo.name),
+                       .help = "Depth of the oscillation",
+                       .controller = lfo.number});
+    }
   }
   std::ranges::stable_sort(knobs, {}, [&](const KnobInfo& knob) {
     return std::ranges::find(usual, knob.controller) - std::begin(usual);

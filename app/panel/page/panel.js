@@ -302,33 +302,45 @@ function makeKnob({ name, address, help, value: start }) {
     'aria-valuemin': 0, 'aria-valuemax': 100,
   });
   const output = make('output');
-  let value = start, held = null;
+  let value = start, told = start, isHeld = false, waits = 0;
   const show = to => {
     value = Math.min(1, Math.max(0, to));
     dial.style.setProperty('--turn', value);
     output.textContent = Math.round(100 * value);
     dial.setAttribute('aria-valuenow', Math.round(100 * value));
   };
-  const turn = to => { show(to); say(address, value); };
+  // The program's answers are late while the knob moves, so the last one is shown at rest.
+  const turn = to => {
+    show(to);
+    say(address, value);
+    clearTimeout(waits);
+    waits = setTimeout(() => { waits = 0; if (!isHeld) show(told); }, 600);
+  };
   dial.addEventListener('keydown', event => {
     if (!(event.key in step)) return;
     turn(value + step[event.key]);
     event.preventDefault();
   });
   dial.addEventListener('pointerdown', event => {
-    dial.setPointerCapture(event.pointerId);
-    held = { from: value, way: event.clientX - event.clientY };
+    const from = value, way = at => at.clientX - at.clientY, ends = new AbortController();
+    const follow = (name, action) => addEventListener(name, at => {
+      if (at.pointerId === event.pointerId) action(at);
+    }, { signal: ends.signal });
+    const release = () => { isHeld = false; ends.abort(); };
+    isHeld = true;
+    follow('pointermove', at => turn(from + (way(at) - way(event)) / 200));
+    follow('pointerup', release);
+    follow('pointercancel', release);
   });
-  dial.addEventListener('pointermove', event => {
-    if (held) turn(held.from + (event.clientX - event.clientY - held.way) / 200);
-  });
-  for (const end of ['pointerup', 'pointercancel']) dial.addEventListener(end, () => { held = null; });
   dial.addEventListener('wheel', event => {
     turn(value - Math.sign(event.deltaY) * 0.02);
     event.preventDefault();
   }, { passive: false });
   show(start);
-  knobs.set(address, to => { if (!held) show(to); });
+  knobs.set(address, to => {
+    told = to;
+    if (!isHeld && !waits) show(to);
+  });
   const knob = make('div', undefined, { class: 'knob' });
   knob.append(dial, make('span', name), output);
   return knob;

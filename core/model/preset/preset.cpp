@@ -494,6 +494,14 @@ void read_name(const toml::table& table, TomlTable& reader, const Preset& preset
   } else if (control.source != ControlSource::controller) {
     reader.fail(node, "only a controller, such as \"cc74\", has a name");
   }
+  for (const LfoSetting& lfo : preset.lfos) {
+    if (lfo.by == ControlSource::controller && lfo.number != control.number &&
+        word_of(lfo.name) == word_of(control.name)) {
+      reader.fail(node, quoted(control.name) + " is already the name of cc" +
+                            std::to_string(lfo.number) + "; choose another");
+      return;
+    }
+  }
   for (const ControlSetting& other : preset.controls) {
     if (other.name.empty()) {
       continue;

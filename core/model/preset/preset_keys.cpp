@@ -63,7 +63,7 @@ constexpr PresetKey keys[] = {
     {"lfo", "shape", "`sine`, `triangle`, `random` or `steps` (`sine`)", "`random`: random points, joined by straight lines; `steps`: random values, kept until the next one"},
     {"lfo", "depth", "0 to 1 (1)", "share of the control's `range`, around its middle"},
     {"lfo", "deviation", "0 to 1 (0)", "greatest random difference of the rate from note to note, as a share of the rate"},
-    {"lfo", "by", "`pressure`, or `cc0` to `cc119`", "scales the depth; without it the depth is constant"},
+    {"lfo", "by", "`pressure`, or `cc0` to `cc119`", "scales the depth; without it the depth is constant. A controller is then a knob with the LFO's name"},
     {"variation", "strength", "0 to 1 (0)", "greatest relative difference of the strength, after the velocity curve"},
     {"variation", "timing_ms", "0 to 50 (0)", "notes start up to this late"},
     {"morph", "parameter", "text", "name of the parameter that moves along the path: 1 is the first stop, 2 the second; controls can move it like any parameter; required"},

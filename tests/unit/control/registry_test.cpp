@@ -15,6 +15,9 @@ const Instrument& instrument() {
   static const Instrument made = [] {
     Preset preset;
     preset.parameters = {{"s_K", 0.1, 0.05, 0.2}, {"s_Z", 0.001, 0.0, 0.01}};
+    preset.lfos = {{.name = "Motor", .by = ControlSource::controller, .number = 92},
+                   {.name = "slow", .by = ControlSource::controller, .number = 71},
+                   {.name = "free"}};
     preset.controls = {{.target = "in1", .gesture = Gesture::pluck, .low = 0.1, .travel = 1.0},
                        {.target = "in2", .gesture = Gesture::bow},
                        {.source = ControlSource::osc, .address = "/finger", .target = "in1"},
@@ -158,7 +161,7 @@ TEST_CASE("a named control moves its controller", "[registry]") {
   CHECK(several->size() == 2);
   check_error("/control/bright 1",
               "/control/bright: the preset has no such control; it has brightness, s_k, "
-              "bow-pressure");
+              "bow-pressure, motor");
   check_error("/control/brightness 1.5",
               "/control/brightness: the value must lie between 0 and 1, found 1.5");
 }
@@ -166,7 +169,7 @@ TEST_CASE("a named control moves its controller", "[registry]") {
 TEST_CASE("named controls come in the usual order, at the positions of their parameters",
           "[registry]") {
   const std::vector<KnobInfo>& knobs = instrument().knobs;
-  REQUIRE(knobs.size() == 3);
+  REQUIRE(knobs.size() == 4);
   CHECK(knobs[0].name == "Brightness");
   CHECK(knobs[0].help == "How bright it is");
   CHECK(knobs[0].address() == "/control/brightness");
@@ -176,6 +179,7 @@ TEST_CASE("named controls come in the usual order, at the positions of their par
   CHECK(knobs[1].position_of(0.0025) == Approx(0.75).epsilon(1e-12));
   CHECK_FALSE(knobs[2].parameter);
   CHECK(knobs[2].rest == 0.5);  // the input starts at 0 of -1 to 1
+  CHECK(knobs[3].address() == "/control/motor");  // scales an LFO, and has no other name
 }
 
 TEST_CASE("masses are struck by name, those of macros by number", "[registry]") {

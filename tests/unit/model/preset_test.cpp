@@ -411,6 +411,9 @@ TEST_CASE("errors in names of controllers have a line and a column", "[preset]")
        "cc71 already has the name 'Ring'; remove one of them"},
       {ring + second("cc72", "name = \"ring\""), 9, 8,
        "'ring' is already the name of cc71; choose another"},
+      {"model = \"x.mdl\"\n[[lfo]]\nname = \"motor\"\nby = \"cc1\"\n" +
+           second("cc2", "name = \"Motor\""),
+       8, 8, "'Motor' is already the name of cc1; choose another"},
   };
   for (const Complaint& complaint : complaints) {
     check_error(complaint);
