@@ -12,13 +12,18 @@ namespace ressort {
 
 enum class LfoShape : std::uint8_t { sine, triangle, random, steps };
 
+// Tempo without a clock: 120 beats per minute.
+inline constexpr double usual_beats_per_s = 2.0;
+
 struct Lfo {
   double rate_hz = 5.0;
+  double beats = 0.0;    // length of an oscillation in beats, in place of the rate; 0: `rate_hz`
   double delay_s = 0.0;  // from the start of the note
   double fade_s = 0.0;   // from the end of the delay to the full depth
   LfoShape shape = LfoShape::sine;
   double depth = 1.0;
   double deviation = 0.0;  // greatest relative difference of the rate from note to note
+  double rate_at(double beats_per_s) const { return beats > 0.0 ? beats_per_s / beats : rate_hz; }
   bool operator==(const Lfo&) const = default;
 };
 
@@ -26,9 +31,18 @@ struct Lfo {
 class LfoState {
  public:
   LfoState() = default;
-  LfoState(const Lfo& lfo, std::uint64_t seed) : random_(seed) {
-    rate_hz_ = lfo.rate_hz * (1.0 + lfo.deviation * random_.next());
+  LfoState(const Lfo& lfo, double beats_per_s, std::uint64_t seed) : random_(seed) {
+    detuning_ = 1.0 + lfo.deviation * random_.next();
+    rate_hz_ = lfo.rate_at(beats_per_s) * detuning_;
     to_ = random_.next();
+  }
+  // Changes the rate of an LFO in beats. The oscillation continues at its phase.
+  void set_tempo(const Lfo& lfo, double beats_per_s) {
+    if (const double t = age_s_ - lfo.delay_s; t > 0.0) {
+      turns_ = turns_at(t);
+      changed_at_s_ = t;
+    }
+    rate_hz_ = lfo.rate_at(beats_per_s) * detuning_;
   }
   void advance(double seconds) { age_s_ += seconds; }
   // Returns a value in -depth..depth. The random shape joins random points by straight lines, one
@@ -38,7 +52,7 @@ class LfoState {
     if (t < 0.0 || (t == 0.0 && lfo.shape != LfoShape::steps)) {
       return 0.0;
     }
-    const double turns = t * rate_hz_;
+    const double turns = turns_at(t);
     const double depth = lfo.depth * (lfo.fade_s > 0.0 ? std::min(1.0, t / lfo.fade_s) : 1.0);
     const double part = turns - std::floor(turns);
     switch (lfo.shape) {
@@ -59,8 +73,13 @@ class LfoState {
   }
 
  private:
+  double turns_at(double t) const { return turns_ + (t - changed_at_s_) * rate_hz_; }
+
   double age_s_ = 0.0;
   double rate_hz_ = 0.0;
+  double detuning_ = 1.0;      // factor on the rate
+  double changed_at_s_ = 0.0;  // time of the last change of the rate, after the delay
+  double turns_ = 0.0;         // turns until then
   RandomNumbers random_;
   double from_ = 0.0;
   double to_ = 0.0;

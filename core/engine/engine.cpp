@@ -109,7 +109,10 @@ struct Engine::Player {
       case EventKind::controller:
         return turn_controller(event);
       case EventKind::program:
+      case EventKind::clock:
         return;
+      case EventKind::tempo:
+        return lfos.set_tempo(event.value);
       case EventKind::pressure:
         return play_controls(Source::pressure, 0, event.value, {.channels = reached_by(channel)});
       case EventKind::key_pressure:
@@ -662,6 +665,10 @@ bool Engine::renumber_from(const Engine& from) {
 void Engine::adopt_channels(const Engine& from) {
   player_->keyboard.adopt_channels(from.player_->keyboard);
   player_->share.adopt(from.player_->share);
+}
+
+void Engine::set_tempo(double beats_per_s) {
+  player_->lfos.set_tempo(beats_per_s);
 }
 
 bool Engine::listens_to(std::uint8_t channel) const {

@@ -65,6 +65,7 @@ class Engine {
 
   // Takes over controllers and tuning messages of an engine of another model. [audio] wait-free
   void adopt_channels(const Engine& from);
+  void set_tempo(double beats_per_s);           // like EventKind::tempo. [audio] wait-free
   bool listens_to(std::uint8_t channel) const;  // [any thread]
 
   // Limits the number of sounding voices, from 1 to Playing::voices. Excess voices fade as stolen

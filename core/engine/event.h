@@ -25,7 +25,10 @@ enum class EventKind : std::uint8_t {
   gesture,       // index: input number, value and value2: the gesture's arguments
   strike,        // value: force for one sample at 44 100 Hz; value2: index of the mass in the
                  // network with expanded macros
-  panic,         // fades all voices to silence
+  tempo,         // value: beats per second of a clock, for LFOs in beats
+  clock,  // a tick of a MIDI clock, of 24 in a beat; the audio thread converts it to a tempo,
+          // and engines ignore it
+  panic,  // fades all voices to silence
 };
 
 // Release velocity of a note-off that does not specify one.

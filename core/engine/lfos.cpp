@@ -22,6 +22,7 @@ Lfos::Lfos(const Playing& playing, double rate_hz)
 
 void Lfos::continue_from(const Lfos& from) {
   if (from.count_ == count_ && from.states_.size() == states_.size()) {
+    beats_per_s_ = from.beats_per_s_;
     states_ = from.states_;
     scales_ = from.scales_;
     channel_scales_ = from.channel_scales_;
@@ -33,10 +34,20 @@ void Lfos::restart(std::size_t lane, std::uint64_t note, Keyboard& keyboard) {
     return;
   }
   for (std::size_t i = 0; i < count_; ++i) {
-    states_[lane * count_ + i] = LfoState(playing_.lfos[i].lfo, note << 8 | i);
+    states_[lane * count_ + i] = LfoState(playing_.lfos[i].lfo, beats_per_s_, note << 8 | i);
     scales_[lane * count_ + i] = channel_scales_[keyboard.voices[lane].channel * count_ + i];
   }
   apply(lane, keyboard);
+}
+
+void Lfos::set_tempo(double beats_per_s) {
+  if (!(beats_per_s > 0.0) || beats_per_s == beats_per_s_) {
+    return;
+  }
+  beats_per_s_ = beats_per_s;
+  for (std::size_t i = 0; i < states_.size(); ++i) {
+    states_[i].set_tempo(playing_.lfos[i % count_].lfo, beats_per_s);
+  }
 }
 
 void Lfos::scale(Source source, int number, double amount, const Scope& scope,

@@ -24,6 +24,8 @@ class Lfos {
   // Follows a controller or the pressure that scales a depth.
   void scale(Source source, int number, double amount, const Scope& scope,
              const Keyboard& keyboard);
+  // Sets the rate of the LFOs in beats.
+  void set_tempo(double beats_per_s);
   // Advances all LFOs. Called once in max_block_frames.
   void advance(Keyboard& keyboard);
 
@@ -33,6 +35,7 @@ class Lfos {
   const Playing& playing_;
   double block_s_;
   std::size_t count_;
+  double beats_per_s_ = usual_beats_per_s;
   std::vector<LfoState> states_;        // [lane][lfo]
   std::vector<double> scales_;          // [lane][lfo] factor on the depth
   std::vector<double> channel_scales_;  // [channel][lfo] the factor for new notes

@@ -32,6 +32,7 @@ constexpr KindName event_names[] = {
     {EventKind::tuning_reset, "tuning_reset"},
     {EventKind::gesture, "gesture"},
     {EventKind::strike, "strike"},
+    {EventKind::tempo, "tempo"},
     {EventKind::panic, "panic"},
 };
 

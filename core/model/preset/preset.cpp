@@ -10,204 +10,11 @@
 
 #include "core/model/language/expression.h"
 #include "core/model/language/tokens.h"
-#include "core/model/preset/toml.h"
+#include "core/model/preset/toml_table.h"
 #include "core/model/topology.h"
 
 namespace ressort::model {
 namespace {
-
-SourceLocation location_of(const toml::node& node) {
-  return {static_cast<int>(node.source().begin.line), static_cast<int>(node.source().begin.column)};
-}
-
-// Reads values from one table and collects all errors. The readers return true if the value exists
-// and is valid.
-class TomlTable {
- public:
-  TomlTable(const toml::table& table, std::string name, std::vector<Error>& errors)
-      : table_(table), name_(std::move(name)), errors_(errors) {}
-
-  // Reports keys that preset_keys() does not list for this table.
-  void allow(std::string_view table) {
-    for (const auto& [key, value] : table_) {
-      bool is_known = false;
-      std::string expected;
-      for (const PresetKey& known : preset_keys()) {
-        if (known.table == table) {
-          is_known |= known.key == key.str();
-          expected += (expected.empty() ? "" : ", ") + std::string(known.key);
-        }
-      }
-      if (!is_known) {
-        fail(value,
-             "unknown key " + quoted(key.str()) + " in " + name_ + "; there are " + expected);
-      }
-    }
-  }
-
-  bool number(std::string_view key, double& target, double least, double most) {
-    const toml::node* node = table_.get(key);
-    return node != nullptr && number(*node, key, target, least, most);
-  }
-
-  void integer(std::string_view key, int& target, int least, int most) {
-    double value = target;
-    if (number(key, value, least, most) && value != std::floor(value)) {
-      fail(*table_.get(key), "'" + std::string(key) + "' must be a whole number");
-    }
-    target = static_cast<int>(value);
-  }
-
-  bool text(std::string_view key, std::string& target) {
-    return take(key, target, "a text in quotes");
-  }
-  bool flag(std::string_view key, bool& target) { return take(key, target, "true or false"); }
-
-  // Reads [low, high].
-  bool pair(std::string_view key, double& low, double& high, double least = -1e12,
-            double most = 1e12) {
-    const toml::node* node = table_.get(key);
-    if (node == nullptr) {
-      return false;
-    }
-    const toml::array* both = node->as_array();
-    if (both == nullptr || both->size() != 2) {
-      return fail(*node, "'" + std::string(key) + "' must be two numbers: [low, high]");
-    }
-    const bool is_first = number((*both)[0], key, low, least, most);
-    return number((*both)[1], key, high, least, most) && is_first;
-  }
-  // Reads [low, high] and checks their order.
-  bool range(std::string_view key, double& low, double& high, double least = -1e12,
-             double most = 1e12) {
-    if (!pair(key, low, high, least, most)) {
-      return false;
-    }
-    return low <= high ||
-           fail(*table_.get(key), "'" + std::string(key) +
-                                      "' is the wrong way round: write the lower number "
-                                      "first, [low, high]");
-  }
-
-  const toml::node* get(std::string_view key) const { return table_.get(key); }
-
-  // Adds an error; returns false.
-  bool fail(const toml::node& node, std::string message) {
-    return fail(location_of(node), std::move(message));
-  }
-  bool fail(SourceLocation location, std::string message) {
-    errors_.push_back({std::move(message), location.line, location.column});
-    return false;
-  }
-
- private:
-  bool number(const toml::node& node, std::string_view key, double& target, double least,
-              double most) {
-    const auto value = node.value<double>();
-    if (!value || node.is_boolean() || !std::isfinite(*value)) {
-      return fail(node, "'" + std::string(key) + "' must be a number");
-    }
-    if (*value < least || *value > most) {
-      char range[80];
-      std::snprintf(range, sizeof range, "must lie between %g and %g", least, most);
-      return fail(node, "'" + std::string(key) + "' " + range);
-    }
-    target = *value;
-    return true;
-  }
-
-  template <class T>
-  bool take(std::string_view key, T& target, std::string_view expected) {
-    const toml::node* node = table_.get(key);
-    if (node == nullptr) {
-      return false;
-    }
-    if (!node->is<T>()) {
-      return fail(*node, "'" + std::string(key) + "' must be " + std::string(expected));
-    }
-    target = *node->value<T>();
-    return true;
-  }
-
-  const toml::table& table_;
-  std::string name_;
-  std::vector<Error>& errors_;
-};
-
-inline constexpr int deepest_toml = 8;  // nested brackets, or dots in a key
-
-// Returns the offset after the string that starts at `at`. A string that is never closed ends with
-// its line, or with the text if it is a multi-line string.
-std::size_t end_of_string(std::string_view text, std::size_t at) {
-  const char quote = text[at];
-  const std::string_view triple = quote == '"' ? "\"\"\"" : "'''";
-  const bool is_long = text.substr(at).starts_with(triple);
-  at += is_long ? 3 : 1;
-  while (at < text.size()) {
-    if (text[at] == '\\' && quote == '"') {
-      at += 2;
-    } else if (!is_long && (text[at] == quote || text[at] == '\n')) {
-      return text[at] == quote ? at + 1 : at;
-    } else if (is_long && text.substr(at).starts_with(triple)) {
-      at += 3;
-      // Up to two more quotes belong to the string.
-      for (int more = 0; more < 2 && at < text.size() && text[at] == quote; ++more) {
-        ++at;
-      }
-      return at;
-    } else {
-      ++at;
-    }
-  }
-  return text.size();
-}
-
-// Returns an error if arrays, inline tables, headers or dotted keys are nested too deeply: toml++
-// is recursive and does not limit dotted keys, so such a text could overflow the stack. O(n).
-std::optional<Error> too_deep(std::string_view toml) {
-  int open = 0;
-  int dots = 0;
-  for (std::size_t at = 0; at < toml.size(); ++at) {
-    switch (toml[at]) {
-      case '"':
-      case '\'':
-        at = end_of_string(toml, at) - 1;
-        continue;
-      case '#':
-        at = std::min(toml.find('\n', at), toml.size()) - 1;
-        continue;
-      case '[':
-      case '{':
-        ++open;
-        dots = 0;
-        break;
-      case ']':
-      case '}':
-        open = std::max(0, open - 1);
-        dots = 0;
-        break;
-      case '\n':
-      case '=':
-      case ',':
-        dots = 0;
-        break;
-      case '.':
-        ++dots;
-        break;
-      default:
-        break;
-    }
-    if (open > deepest_toml || dots > deepest_toml) {
-      const std::string_view before = toml.substr(0, at);
-      const std::size_t line_start = before.rfind('\n') + 1;  // 0 on the first line
-      return Error{"this is nested more than " + std::to_string(deepest_toml) +
-                       " levels deep; a preset needs 3",
-                   static_cast<int>(std::count(before.begin(), before.end(), '\n')) + 1,
-                   static_cast<int>(at - line_start) + 1};
-    }
-  }
-  return std::nullopt;
-}
 
 using IsReserved = bool (*)(std::string_view address);
 
@@ -414,6 +221,9 @@ void read_lfo(const toml::table& table, Preset& preset, std::vector<Error>& erro
                 "an LFO needs a name of its own, of letters and digits: name = \"vibrato\"");
   }
   reader.number("rate_hz", lfo.rate_hz, 0.01, 50.0);
+  if (reader.number("beats", lfo.beats, 0.01, 100.0) && table.get("rate_hz") != nullptr) {
+    reader.fail(*table.get("beats"), "'beats' and 'rate_hz' both set the rate; remove one of them");
+  }
   reader.number("delay_s", lfo.delay_s, 0.0, 60.0);
   reader.number("fade_s", lfo.fade_s, 0.0, 60.0);
   reader.number("depth", lfo.depth, 0.0, 1.0);
@@ -1119,18 +929,12 @@ ParsedPreset parse_preset(std::string_view text, IsReserved is_reserved) {
     read.errors.push_back({"the preset is longer than 64 KiB", 1, 1});
     return read;
   }
-  if (auto error = too_deep(text)) {
-    read.errors.push_back(*std::move(error));
-    return read;
-  }
-  const toml::parse_result parsed = toml::parse(text);
+  const auto parsed = parse_toml(text);
   if (!parsed) {
-    const auto& begin = parsed.error().source().begin;
-    read.errors.push_back({std::string(parsed.error().description()), static_cast<int>(begin.line),
-                           static_cast<int>(begin.column)});
+    read.errors.push_back(parsed.error());
     return read;
   }
-  read_root(parsed.table(), read.preset, read.errors, is_reserved);
+  read_root(*parsed, read.preset, read.errors, is_reserved);
   std::sort(read.preset.parameters.begin(), read.preset.parameters.end(),
             [](const auto& a, const auto& b) { return a.name < b.name; });
   std::stable_sort(read.errors.begin(), read.errors.end(), [](const Error& a, const Error& b) {

@@ -58,6 +58,7 @@ constexpr PresetKey keys[] = {
     {"control", "keys", "[low, high] ([0, 127])", "for notes and releases: range of keys"},
     {"lfo", "name", "text", "name for `from` in a control; required"},
     {"lfo", "rate_hz", "0.01 to 50 (5)", "oscillations per second; of the random shapes, values per second"},
+    {"lfo", "beats", "0.01 to 100", "length of an oscillation in beats, in place of `rate_hz`. The beats are those of a MIDI clock or of JACK's transport, or 120 per minute without a clock"},
     {"lfo", "delay_s", "0 to 60 (0)", "time from the start of the note to the start of the oscillation"},
     {"lfo", "fade_s", "0 to 60 (0)", "time from there to the full depth"},
     {"lfo", "shape", "`sine`, `triangle`, `random` or `steps` (`sine`)", "`random`: random points, joined by straight lines; `steps`: random values, kept until the next one"},

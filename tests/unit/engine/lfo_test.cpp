@@ -103,6 +103,24 @@ TEST_CASE("a vibrato has its rate and depth, after its delay and fade", "[lfo]")
   }
 }
 
+// Two oscillations per beat are 4 Hz at 120 beats per minute and 6 Hz at 180. The oscillation is at
+// the middle of its turn when the tempo changes, so a jump of the phase would move the pitch by
+// many times the largest step of a vibrato of 6 Hz: 2 pi 6 Hz * 50 cents / 440 Hz.
+TEST_CASE("an LFO in beats follows the tempo without a jump", "[lfo]") {
+  const LfoSetting vibrato{.name = "v", .lfo = {.beats = 0.5}};
+  const std::uint32_t change = 49613;  // 1.125 s: 4.5 turns
+  const Event tempo{.frame = change, .kind = EventKind::tempo, .value = 3.0};
+  const auto cents = cents_of(heard(moved(vibrato, "pitch", -50.0, 50.0), {note_on(0, 69), tempo}));
+  std::vector<Reading> before = cents;
+  std::erase_if(before, [](const Reading& reading) { return reading.time_s > 1.1; });
+  CHECK(rate_of(before, 0.05) == Approx(4.0).epsilon(0.01));
+  CHECK(rate_of(cents, 1.2) == Approx(6.0).epsilon(0.01));
+  const double steepest = 2.0 * std::numbers::pi * 6.0 * 50.0 / 440.0;
+  for (std::size_t i = 20; i < cents.size(); ++i) {
+    CHECK(std::fabs(cents[i].value - cents[i - 1].value) < 1.5 * steepest);
+  }
+}
+
 TEST_CASE("a tremolo changes the level by its range in dB", "[lfo]") {
   const LfoSetting tremolo{.name = "t", .lfo = {.rate_hz = 4.0, .delay_s = 0.5}};
   const auto there = levels_of(heard(moved(tremolo, "level", -12.0, 0.0), one_note));

@@ -1,0 +1,239 @@
+#include "core/model/preset/controllers.h"
+
+#include <algorithm>
+#include <charconv>
+
+#include "core/model/preset/toml_table.h"
+
+namespace ressort::model {
+namespace {
+
+// clang-format off
+constexpr PresetKey mapping_keys[] = {
+    {"controller", "from", "text", "`cc0` to `cc119`, `nrpn 0` to `nrpn 16383`, or `note 0` to `note 127`; required"},
+    {"controller", "to", "text", "the name of a parameter or of a control of the preset, `cc0` to `cc119`, `sustain`, or for a button `next`, `previous` (presets), `load NAME`, `load NUMBER` or `panic`; required"},
+    {"controller", "mode", "`absolute`, `twos-complement`, `offset` or `sign-magnitude` (`absolute`)", "the last three are encoders, which send steps: a step up is 1, 65 or 1, a step down 127, 63 or 65. A step is 1/127 of the range"},
+    {"controller", "bits", "7 or 14 (7; of an NRPN 14)", "14: `cc0` to `cc31` together with the controller 32 above it, or CC 6 and 38 of an NRPN"},
+    {"controller", "pickup", "true or false (false)", "the knob acts once it has met or crossed the present value"},
+    {"controller", "send", "true or false (false)", "the present value is sent to the port `midi_out` (JACK), for motor faders and rings of lights"},
+    {"controller", "channel", "1 to 16 (all)", "the MIDI channel to receive; `send` uses it, or channel 1"},
+};
+// clang-format on
+
+// Reads a number after a prefix and at most one blank; -1 if the text is different or out of range.
+int number_after(std::string_view prefix, std::string_view text, int most) {
+  if (!text.starts_with(prefix)) {
+    return -1;
+  }
+  text.remove_prefix(prefix.size() + (text.substr(prefix.size()).starts_with(' ') ? 1 : 0));
+  int number = -1;
+  const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), number);
+  const bool is_number = failure == std::errc{} && end == text.data() + text.size();
+  return is_number && number >= 0 && number <= most ? number : -1;
+}
+
+struct SourceWord {
+  ControllerSource source;
+  const char* word;
+  int most;
+};
+constexpr SourceWord source_words[] = {
+    {ControllerSource::controller, "cc", 119},
+    {ControllerSource::nrpn, "nrpn", 16383},
+    {ControllerSource::note, "note", 127},
+};
+
+struct ModeWord {
+  ControllerMode mode;
+  const char* word;
+};
+constexpr ModeWord mode_words[] = {
+    {ControllerMode::absolute, "absolute"},
+    {ControllerMode::twos_complement, "twos-complement"},
+    {ControllerMode::offset, "offset"},
+    {ControllerMode::sign_magnitude, "sign-magnitude"},
+};
+
+// Returns whether a controller is a part of RPN and NRPN messages.
+bool is_part_of_number(int controller) {
+  return controller == 6 || controller == 38 || (controller >= 96 && controller <= 101);
+}
+
+class MappingReader {
+ public:
+  explicit MappingReader(ParsedControllers& read) : read_(read) {}
+
+  void read(const toml::table& table) {
+    const toml::node& at = table.get("from") != nullptr ? *table.get("from") : table;
+    TomlTable reader(table, "a controller", read_.errors);
+    reader.allow("controller", controller_keys());
+    ControllerSetting setting;
+    if (!read_from(reader, at, setting.input) || !read_target(reader, table, setting.target) ||
+        !read_mode(reader, setting)) {
+      return;
+    }
+    reader.flag("pickup", setting.input.picks_up);
+    reader.flag("send", setting.input.sends);
+    if (int channel = 0; table.get("channel") != nullptr) {
+      reader.integer("channel", channel, 1, 16);
+      setting.input.channel = static_cast<std::uint8_t>(channel - 1);
+    }
+    check_button(reader, at, setting);
+    check_others(reader, at, setting.input);
+    read_.rows.push_back(std::move(setting));
+  }
+
+ private:
+  bool read_from(TomlTable& reader, const toml::node& at, ControllerInput& input) {
+    std::string from;
+    reader.text("from", from);
+    for (const SourceWord& row : source_words) {
+      if (const int number = number_after(row.word, from, row.most); number >= 0) {
+        if (row.source == ControllerSource::controller && is_part_of_number(number)) {
+          return reader.fail(at, quoted(from) +
+                                     " is a part of RPN and NRPN messages; map the "
+                                     "number, such as \"nrpn 1234\"");
+        }
+        input.source = row.source;
+        input.number = static_cast<std::uint16_t>(number);
+        input.has_14_bits = row.source == ControllerSource::nrpn;
+        return true;
+      }
+    }
+    return reader.fail(at,
+                       "'from' must be \"cc0\" to \"cc119\", \"nrpn 0\" to \"nrpn 16383\", or "
+                       "\"note 0\" to \"note 127\"");
+  }
+
+  bool read_target(TomlTable& reader, const toml::table& table, std::string& target) {
+    if (!reader.text("to", target) || target.empty()) {
+      const toml::node* const node = table.get("to");
+      return reader.fail(node != nullptr ? *node : table,
+                         "'to' must be the name of a parameter or control, \"cc0\" to \"cc119\", "
+                         "sustain, next, previous, \"load NAME\" or panic");
+    }
+    return true;
+  }
+
+  // Reads the mode and the bits.
+  bool read_mode(TomlTable& reader, ControllerSetting& setting) {
+    ControllerInput& input = setting.input;
+    if (std::string word; reader.text("mode", word)) {
+      const auto* const row =
+          std::find_if(std::begin(mode_words), std::end(mode_words),
+                       [&](const ModeWord& known) { return known.word == word; });
+      if (row == std::end(mode_words)) {
+        return reader.fail(*reader.get("mode"),
+                           "'mode' must be absolute, twos-complement, offset or sign-magnitude");
+      }
+      input.mode = row->mode;
+    }
+    const bool is_relative = input.mode != ControllerMode::absolute;
+    input.has_14_bits = input.has_14_bits && !is_relative;
+    const toml::node* const node = reader.get("bits");
+    int bits = input.has_14_bits ? 14 : 7;
+    reader.integer("bits", bits, 7, 14);
+    const bool can_have_14 = input.source == ControllerSource::nrpn ||
+                             (input.source == ControllerSource::controller && input.number < 32);
+    if (node != nullptr && ((bits != 7 && bits != 14) || (bits == 14 && !can_have_14))) {
+      return reader.fail(*node, "'bits' must be 7, or 14 for cc0 to cc31 and for an NRPN");
+    }
+    if (bits == 14 && is_relative) {
+      return reader.fail(*node, "an encoder sends steps of 7 bits; remove 'bits' or 'mode'");
+    }
+    input.has_14_bits = bits == 14;
+    return true;
+  }
+
+  void check_button(TomlTable& reader, const toml::node& at, const ControllerSetting& setting) {
+    const ControllerInput& input = setting.input;
+    const bool is_relative = input.mode != ControllerMode::absolute;
+    const bool is_note = input.source == ControllerSource::note;
+    if (is_action(setting.target) && (is_relative || input.picks_up || input.sends)) {
+      reader.fail(at, quoted(setting.target) +
+                          " is an action of a button; 'mode', 'pickup' and "
+                          "'send' have no effect on it");
+    } else if (is_note && (is_relative || input.picks_up || input.sends)) {
+      reader.fail(at, "'mode', 'pickup' and 'send' have no effect on a note; use a controller");
+    }
+  }
+
+  // Reports an earlier row for the same messages.
+  void check_others(TomlTable& reader, const toml::node& at, const ControllerInput& input) {
+    const auto low_half = [](ControllerInput whole) {
+      whole.number = static_cast<std::uint16_t>(whole.number + 32);
+      return whole;
+    };
+    const auto is_half_of = [&](const ControllerInput& half, const ControllerInput& whole) {
+      return whole.source == ControllerSource::controller && whole.has_14_bits &&
+             half.is_same_source(low_half(whole));
+    };
+    for (const ControllerSetting& other : read_.rows) {
+      if (input.is_same_source(other.input)) {
+        reader.fail(at, name_of(input) + " is mapped twice; remove one of the rows");
+      } else if (is_half_of(input, other.input) || is_half_of(other.input, input)) {
+        reader.fail(at, name_of(input) + " and " + name_of(other.input) +
+                            " are one controller of 14 bits; remove one of the rows");
+      }
+    }
+  }
+
+  ParsedControllers& read_;
+};
+
+}  // namespace
+
+bool is_action(std::string_view target) {
+  return target == "next" || target == "previous" || target == "panic" ||
+         target.starts_with("load ");
+}
+
+int controller_number(std::string_view target) {
+  constexpr int sustain_pedal = 64;
+  return target == "sustain" ? sustain_pedal : number_after("cc", target, 119);
+}
+
+std::string name_of(const ControllerInput& input) {
+  const auto* const row =
+      std::find_if(std::begin(source_words), std::end(source_words),
+                   [&](const SourceWord& known) { return known.source == input.source; });
+  return std::string(row->word) + (input.source == ControllerSource::controller ? "" : " ") +
+         std::to_string(input.number) +
+         (input.channel == ControllerInput::any_channel
+              ? ""
+              : " on channel " + std::to_string(input.channel + 1));
+}
+
+std::span<const PresetKey> controller_keys() {
+  return mapping_keys;
+}
+
+ParsedControllers parse_controllers(std::string_view text) {
+  ParsedControllers read;
+  if (text.size() > max_preset_bytes) {
+    read.errors.push_back({"the mapping is longer than 64 KiB", 1, 1});
+    return read;
+  }
+  const auto parsed = parse_toml(text);
+  if (!parsed) {
+    read.errors.push_back(parsed.error());
+    return read;
+  }
+  MappingReader reader(read);
+  for (const auto& [key, node] : *parsed) {
+    const toml::array* const rows = node.as_array();
+    if (key.str() != "controller" || rows == nullptr || !rows->is_homogeneous<toml::table>() ||
+        rows->size() > most_controllers) {
+      const SourceLocation at = location_of(node);
+      read.errors.push_back(
+          {"a mapping has only tables of the name [[controller]], up to 128", at.line, at.column});
+      continue;
+    }
+    for (const toml::node& row : *rows) {
+      reader.read(*row.as_table());
+    }
+  }
+  return read;
+}
+
+}  // namespace ressort::model

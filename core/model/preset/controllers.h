@@ -1,0 +1,45 @@
+// core/model: the user's mapping of controllers, which holds for all presets.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/controller.h"
+#include "core/model/preset/preset.h"
+
+namespace ressort::model {
+
+inline constexpr std::size_t most_controllers = 128;
+
+struct ControllerSetting {
+  ControllerInput input;
+  // "cc0" to "cc119", "next", "previous", "load NAME", "panic", "sustain", or the name of a
+  // parameter or control, which a preset may have or not.
+  std::string target;
+  bool operator==(const ControllerSetting&) const = default;
+};
+
+// Returns whether a target is an action of a button: next, previous, load or panic.
+bool is_action(std::string_view target);
+
+// Returns the number of a target "cc0" to "cc119", 64 for "sustain", or -1.
+int controller_number(std::string_view target);
+
+// Returns the source as the mapping names it, such as "cc20" or "nrpn 1234 on channel 2".
+std::string name_of(const ControllerInput& input);
+
+// Returns the keys of a mapping, for its reader and its document.
+std::span<const PresetKey> controller_keys();
+
+struct ParsedControllers {
+  std::vector<ControllerSetting> rows;
+  std::vector<Error> errors;  // in the order of the lines
+  bool ok() const { return errors.empty(); }
+};
+
+// Reads a mapping. Continues after an error, to report all of them. [any thread but audio]
+ParsedControllers parse_controllers(std::string_view toml);
+
+}  // namespace ressort::model
