@@ -55,6 +55,7 @@ int print_man(const CLI::App& app) {
       ".SH FILES\n.TP\n$XDG_DATA_HOME/ressort, ~/.local/share/ressort\nmodels, presets and flights "
       "of the\n"
       "user\n"
+      ".TP\n$XDG_CONFIG_HOME/ressort/controllers.toml\nthe user's mapping of controllers\n"
       ".SH SEE ALSO\n.BR jackd (1),\n.BR gnuplot (1)\n");
   return exit_code::done;
 }

@@ -108,6 +108,10 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
   command->add_option("-e,--execute", options.script, "file of console commands to run first")
       ->type_name("FILE");
   command
+      ->add_option("--controllers", options.controllers,
+                   "mapping of controllers (default: controllers.toml in ~/.config/ressort)")
+      ->type_name("FILE");
+  command
       ->add_option_function<std::string>(
           "-u,--osc-port",
           [&options](const std::string& text) {

@@ -11,6 +11,7 @@
 #include "app/exit_code.h"
 #include "app/realtime/midi_chart.h"
 #include "core/model/language/keywords.h"
+#include "core/model/preset/controllers.h"
 #include "core/model/preset/preset.h"
 
 namespace ressort::commands {
@@ -47,11 +48,19 @@ void print_keywords() {
   }
 }
 
-void print_preset_keys() {
+void print_keys(std::span<const PresetKey> keys) {
   print_head({"table", "key", "value", "meaning"});
-  for (const PresetKey& key : preset_keys()) {
+  for (const PresetKey& key : keys) {
     print_row({code(key.table), code(key.key), std::string(key.value), std::string(key.does)});
   }
+}
+
+void print_preset_keys() {
+  print_keys(preset_keys());
+}
+
+void print_controller_keys() {
+  print_keys(controller_keys());
 }
 
 void print_gestures() {
@@ -112,6 +121,7 @@ void print_materials() {
 constexpr ReferencePart parts[] = {
     {"model", "the keywords of a .mdl file", print_keywords},
     {"preset", "the keys of a preset", print_preset_keys},
+    {"controllers", "the keys of a mapping of controllers", print_controller_keys},
     {"gestures", "the gestures of a preset's controls", print_gestures},
     {"midi", "the MIDI implementation chart", print_midi},
     {"osc", "the addresses of OSC and of scores", print_addresses},

@@ -411,16 +411,22 @@ std::vector<std::vector<std::string>> control_rows(const ConsoleContext& console
     const auto value = console.session.parameter(name);
     return value ? "; now " + print_number(*value) : "";
   };
-  const std::vector<LearnedRow> learned = console.session.learned();
-  for (const LearnedRow& row : learned) {
-    rows.push_back({"cc" + std::to_string(row.controller),
-                    "controls " + row.target + ", learned" + now(row.target)});
+  const std::vector<MappedRow> mapping = console.session.mapping();
+  for (const MappedRow& row : mapping) {
+    const std::string& target = row.setting.target;
+    rows.push_back({name_of(row.setting.input),
+                    is_action(target) ? target + ", mapped"
+                    : !row.exists     ? "mapped to " + target + ", which this sound does not have"
+                                      : "controls " + target +
+                                        (row.is_learned ? ", learned" : ", mapped") + now(target)});
   }
   for (const ControlSetting& control : current.preset.controls) {
-    const bool is_replaced =
-        control.source == ControlSource::controller &&
-        std::any_of(learned.begin(), learned.end(),
-                    [&](const LearnedRow& row) { return row.controller == control.number; });
+    const bool is_replaced = control.source == ControlSource::controller &&
+                             std::any_of(mapping.begin(), mapping.end(), [&](const MappedRow& row) {
+                               return row.exists &&
+                                      row.setting.input.source == ControllerSource::controller &&
+                                      row.setting.input.number == control.number;
+                             });
     if (is_replaced) {
       continue;
     }

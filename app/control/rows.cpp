@@ -273,7 +273,8 @@ std::vector<Row> make_rows() {
        .command_does = "assigns the next knob that you move to a control or a parameter",
        .details =
            "It may also be an OSC address of the preset, such as /finger. The knob loses its "
-           "other\nfunction until 'unlearn'. 'save NAME' saves the assignment.",
+           "other\nfunction until 'unlearn', in every preset that has this target. 'save NAME' "
+           "saves the\nassignment.",
        .act = command::learn},
       {.command = "unlearn",
        .group = CommandGroup::parameters,

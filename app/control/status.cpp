@@ -153,6 +153,11 @@ constexpr StatusRow status_table[] = {
     {"strangers", "", "OSC packets from senders that are not allowed", &Status::strangers,
      not_in_reply, "events",
      [](const Status& now) { return std::to_string(now.strangers) + " ignored"; }},
+    {"tempo", "beats / min", "tempo of a MIDI clock or of JACK's transport; 0: none so far",
+     &Status::tempo, not_in_reply, "clock",
+     [](const Status& now) {
+       return now.tempo > 0.0 ? fixed(now.tempo, 1) + " beats per minute" : "none";
+     }},
     {"modes", "", "modes of the sounding voices", &Status::modes, not_in_reply, "modes",
      tell_modes},
     {"modes_awake", "", "modes that are awake", &Status::modes_awake},

@@ -2,6 +2,7 @@
 #include <jack/metadata.h>
 #include <jack/midiport.h>
 #include <jack/thread.h>
+#include <jack/transport.h>
 #include <jack/uuid.h>
 
 #include <algorithm>
@@ -34,6 +35,7 @@ struct Jack {
   jack_client_t* client = nullptr;
   std::vector<jack_port_t*> outputs;
   jack_port_t* midi = nullptr;
+  jack_port_t* midi_out = nullptr;  // null: no controller wants messages
   std::array<Published<jack_port_t>, most_audio_inputs> inputs;  // registered when needed
   std::int64_t clock_offset_ns = 0;                              // monotonic clock minus JACK's
   double rate_hz = 48000.0;
@@ -89,10 +91,21 @@ int on_process(jack_nframes_t frames, void* self) {
   if (jack_get_cycle_times(jack.client, &frame, &now_us, &next_us, &period_us) != 0) {
     now_us = jack_get_time();
   }
+  jack_position_t position;
+  jack_transport_query(jack.client, &position);
+  jack.process.set_transport_tempo(
+      (position.valid & JackPositionBBT) != 0 ? position.beats_per_minute / 60.0 : 0.0);
   jack.process.block(std::span<const float* const>(jack.input_buffers.data(), inputs),
                      std::span<float* const>(jack.output_buffers), frames,
                      {jack.packets.data(), count},
                      static_cast<std::int64_t>(now_us) * 1000 + jack.clock_offset_ns);
+  if (jack.midi_out != nullptr) {
+    void* const out = buffer(jack.midi_out);
+    jack_midi_clear_buffer(out);
+    for (const MidiBytes& message : jack.process.midi_out()) {
+      jack_midi_event_write(out, frames - 1, message.data(), message.size());
+    }
+  }
   return 0;
 }
 
@@ -228,6 +241,9 @@ void set_audio_inputs(Jack& jack, int wanted) {
 std::vector<jack_port_t*> own_ports(const Jack& jack) {
   std::vector<jack_port_t*> ports = jack.outputs;
   ports.push_back(jack.midi);
+  if (jack.midi_out != nullptr) {
+    ports.push_back(jack.midi_out);
+  }
   for (std::size_t i = 0; i < jack.inputs.size() && jack.inputs[i].get() != nullptr; ++i) {
     ports.push_back(jack.inputs[i].get());
   }
@@ -308,6 +324,10 @@ void describe_ports(Jack& jack) {
              "Outputs", static_cast<int>(i));
   }
   describe(jack, jack.midi, "MIDI", "Control", static_cast<int>(jack.outputs.size()));
+  if (jack.midi_out != nullptr) {
+    describe(jack, jack.midi_out, "MIDI to controllers", "Control",
+             static_cast<int>(jack.outputs.size()) + 1);
+  }
 }
 
 bool register_ports(Jack& jack) {
@@ -322,7 +342,12 @@ bool register_ports(Jack& jack) {
   jack.output_buffers.resize(jack.outputs.size());
   jack.midi =
       jack_port_register(jack.client, "midi_in", JACK_DEFAULT_MIDI_TYPE, JackPortIsInput, 0);
-  return jack.midi != nullptr && jack.outputs.back() != nullptr;
+  if (jack.options.sends_midi) {
+    jack.midi_out =
+        jack_port_register(jack.client, "midi_out", JACK_DEFAULT_MIDI_TYPE, JackPortIsOutput, 0);
+  }
+  return jack.midi != nullptr && jack.outputs.back() != nullptr &&
+         (jack.midi_out != nullptr || !jack.options.sends_midi);
 }
 
 }  // namespace

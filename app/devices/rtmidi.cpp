@@ -15,7 +15,8 @@ struct MidiPort {
   MidiPort(RtMidi::Api api, const std::string& client, MidiSink& door_in)
       : door(door_in), input(api, client) {
     input.setCallback(arrived, this);
-    input.ignoreTypes(false, true, true);  // false: receive system exclusive messages, for tunings
+    // Receives system exclusive messages, for tunings, and the clock, but no active sensing.
+    input.ignoreTypes(false, false, true);
   }
 
   // Passes a packet on with its time of arrival, on the clock that the audio thread reads. RtMidi's

@@ -23,8 +23,10 @@ int data_bytes(std::uint8_t status) {
 }  // namespace
 
 bool MidiReader::take(std::uint8_t byte, Event& event) {
-  if (byte >= 0xf8) {
-    return false;  // real-time messages (clock, active sensing, reset) may interrupt any message
+  if (byte >=
+      0xf8) {  // real-time messages (clock, active sensing, reset) may interrupt any message
+    event = {.kind = EventKind::clock};
+    return byte == 0xf8;
   }
   if (byte >= 0x80) {
     if (in_exclusive_ && byte == 0xf7) {

@@ -25,7 +25,7 @@ constexpr MidiChartRow rows[] = {
     {"soft pedal", "CC 67", true, "notes struck while it is down sound as at three quarters of their velocity"},
     {"legato switch", "CC 68", true, "64 and above: a mono channel is not struck again while a key is down"},
     {"data increment, decrement", "CC 96, 97", true, "changes the selected RPN by its smallest step"},
-    {"NRPN", "CC 98, 99", false, "data that follows is ignored"},
+    {"NRPN", "CC 98, 99", true, "selects the number of a mapping of controllers; data for other numbers are ignored"},
     {"RPN", "CC 100, 101", true, "selects the registered parameter; 127 and 127 selects none"},
     {"RPN bend range", "0", true, "semitones and cents; applies to all members of an MPE zone"},
     {"RPN fine tuning", "1", true, "of the channel, -1 to 1 semitone"},
@@ -44,7 +44,8 @@ constexpr MidiChartRow rows[] = {
     {"SysEx tuning dump", "F0 7E id 08 01", true, "all 128 keys, for new notes"},
     {"SysEx octave tuning", "F0 7F id 08 08, 08 09", true, "cents of the twelve keys of every octave, in one or two bytes; also for sounding notes, with 7E only for new notes; the channel mask is ignored"},
     {"other SysEx", "", false, ""},
-    {"system common, real time", "", false, "no clock or song position"},
+    {"timing clock", "F8", true, "24 in a beat: sets the rate of LFOs in beats"},
+    {"other system common, real time", "", false, "no start, stop or song position"},
 };
 // clang-format on
 

@@ -89,7 +89,9 @@ void Process::run(std::span<const Sample* const> inputs, std::span<Sample* const
   const std::int64_t start_ns = clock_ns_ != nullptr ? clock_ns_() : 0;
   const DenormalsFlushed flushed;
   clock.write({frame_, time_ns, rate_hz_, static_cast<std::int64_t>(frames)});
-  apply_mapping_changes();
+  if (controllers.take()) {
+    mapper_.use(controllers.reading());
+  }
   const std::size_t input_count = std::min(inputs.size(), max_channels);
   const std::size_t output_count = std::min(outputs.size(), max_channels);
   if (frames > 0) {
@@ -127,6 +129,8 @@ void Process::run(std::span<const Sample* const> inputs, std::span<Sample* const
     }
     frame_ += static_cast<std::int64_t>(n);
   }
+  follow_present_values();
+  midi_out_ = mapper_.messages();
   write_motion();
   publish_meters();
   if (clock_ns_ != nullptr && !has_time.is_raised()) {
@@ -174,6 +178,9 @@ void Process::collect_events(std::size_t frames, std::span<const MidiPacket> mid
                              std::int64_t time_ns) {
   now_.clear();
   next_now_ = 0;
+  if (std::exchange(known_transport_tempo_, transport_tempo_) != transport_tempo_) {
+    add_now(frame_, {.kind = EventKind::tempo, .value = transport_tempo_});
+  }
   // The session first, so that an answer from another source overrides it.
   read_ring(from_session, frames, time_ns);
   read_ring(from_osc, frames, time_ns);
@@ -247,6 +254,7 @@ void Process::discard_after(std::int64_t frame) {
 
 void Process::collect_due(std::size_t frames) {
   due_.clear();
+  follow_present_values();
   const std::int64_t end = frame_ + static_cast<std::int64_t>(frames);
   const std::size_t most_moments = keeps_every_frame_ || has_time.is_raised()
                                        ? frames
@@ -254,13 +262,15 @@ void Process::collect_due(std::size_t frames) {
   std::size_t moments = 0;
   const auto collect = [&](const Pending& next) {
     Event event = next.event;
+    count_event(event);
+    if (!follow_tempo(event, next.frame) || !map_controller(event, next.frame)) {
+      return;
+    }
     event.frame = static_cast<std::uint32_t>(std::max<std::int64_t>(0, next.frame - frame_));
     if (due_.empty() || event.frame != due_.back().frame) {
       // The rest of a flood acts at the last cut: early, but complete and in order.
       event.frame = ++moments <= most_moments ? event.frame : due_.back().frame;
     }
-    count_event(event);
-    map_controller(event);
     if (event.kind == EventKind::controller && current_ != nullptr &&
         current_->engine->listens_to(event.channel)) {
       reports.push({Report::Kind::controller, current_->serial, event.index, event.value});
@@ -319,33 +329,48 @@ void Process::count_event(const Event& event) {
   }
 }
 
-void Process::apply_mapping_changes() {
-  MappingChange change;
-  for (std::size_t left = mapping_changes.size(); left > 0 && mapping_changes.pop(change); --left) {
-    learned_[change.controller % learned_.size()] = change.control;
+// Converts a tick of a MIDI clock to a tempo. Returns false if the event is to be ignored.
+bool Process::follow_tempo(Event& event, std::int64_t frame) {
+  constexpr double least_change = 1e-4;  // relative; frames round the ticks' times
+  if (event.kind == EventKind::clock) {
+    event.kind = EventKind::tempo;
+    event.value = tick_clock_.add(frame, rate_hz_);
+    if (std::fabs(event.value - tempo_) <= least_change * tempo_) {
+      return false;
+    }
   }
+  if (event.kind == EventKind::tempo && event.value > 0.0) {
+    tempo_ = event.value;
+    meters_.tempo = 60.0 * tempo_;
+  }
+  return event.kind != EventKind::tempo || event.value > 0.0;
 }
 
-// Replaces a learned controller by its target, if that belongs to the current model. An event for
-// a named control of a model has its function already.
-void Process::map_controller(Event& event) {
-  if (event.kind != EventKind::controller || event.model != 0 || current_ == nullptr) {
-    return;
+// Replaces a mapped controller by its target. Returns false if the event is not for the engines.
+bool Process::map_controller(Event& event, std::int64_t frame) {
+  switch (mapper_.map(event)) {
+    case ControllerMapper::Result::action:
+      reports.push({.kind = Report::Kind::action, .index = event.index});
+      return false;
+    case ControllerMapper::Result::nothing:
+      return false;
+    case ControllerMapper::Result::mapped:
+      if (event.kind == EventKind::parameter) {
+        reports.push({Report::Kind::parameter, event.model, event.index, event.value});
+      } else if (event.kind == EventKind::panic) {
+        discard_after(frame);
+      }
+      break;
+    case ControllerMapper::Result::passes:
+      break;
   }
-  const LearnedControl& control = learned_[event.index % learned_.size()];
-  if (control.model == 0 || control.model != current_->serial) {
-    return;
-  }
-  const double turned = control.exponential
-                            ? control.low * std::pow(control.high / control.low, event.value)
-                            : control.low + event.value * (control.high - control.low);
-  event.kind = control.kind;
-  event.index = control.index;
-  event.model = control.model;
-  event.value = turned;
-  if (event.kind == EventKind::parameter) {
-    reports.push({Report::Kind::parameter, event.model, event.index, turned});
-  }
+  mapper_.follow(event);
+  return true;
+}
+
+void Process::follow_present_values() {
+  mapper_.begin_chunk(current_ != nullptr ? current_->engine.get() : nullptr,
+                      current_ != nullptr ? current_->serial : 0);
 }
 
 // Takes a new engine at the start of a chunk, once the last crossfade is over and its engine is
@@ -610,6 +635,7 @@ PlayingEngine* Process::take_next_engine() {
   PlayingEngine* const next = slot.take();
   if (next != nullptr) {
     log_record({.frame = frame_, .kind = FlightRecord::Kind::take, .count = next->number});
+    next->engine->set_tempo(tempo_);
   }
   return next;
 }

@@ -7,11 +7,13 @@
 #include <span>
 #include <vector>
 
+#include "app/realtime/controllers.h"
 #include "app/realtime/dsp_load.h"
 #include "app/realtime/flight_record.h"
 #include "app/realtime/lockfree.h"
 #include "app/realtime/midi.h"
 #include "app/realtime/motion.h"
+#include "app/realtime/tick_clock.h"
 #include "core/engine/dc_blocker.h"
 #include "core/engine/engine.h"
 #include "core/engine/limiter.h"
@@ -49,29 +51,13 @@ struct MidiPacket {
 
 // A message from the audio thread to the worker.
 struct Report {
-  enum class Kind : std::uint8_t { parameter, controller, reset, overload, program };
+  enum class Kind : std::uint8_t { parameter, controller, reset, overload, program, action };
   Kind kind = Kind::reset;
   std::uint32_t model = 0;  // serial of the model
-  // Parameter, controller, or number of voices that there is time for; 0: unlimited.
+  // Parameter, controller, number of voices that there is time for (0: unlimited), or row of an
+  // action.
   std::uint16_t index = 0;
-  double value = 0.0;  // value of the parameter or controller, or the load, or 128 * bank + program
-};
-
-// The target of a learned controller. It overrides the preset while the model with this serial
-// plays.
-struct LearnedControl {
-  EventKind kind = EventKind::parameter;  // or EventKind::custom
-  std::uint16_t index = 0;
-  std::uint32_t model = 0;  // serial; 0: nothing is learned
-  double low = 0.0;         // value at controller value 0
-  double high = 1.0;
-  bool exponential = false;  // equal steps of the controller are equal ratios
-};
-
-// A change of the learned controllers, on its way to the audio thread.
-struct MappingChange {
-  std::uint8_t controller = 0;
-  LearnedControl control;
+  double value = 0.0;  // value of the parameter, or the load, or 128 * bank + program
 };
 
 struct PlayedNote {
@@ -115,6 +101,7 @@ struct Meters : EngineMeters {
   std::array<PlayedNote, 4> last_notes{};  // the latest notes; note n is at n modulo 4
   std::uint64_t turns = 0;                 // controller events so far
   std::uint8_t last_controller = 0;        // controller number of the latest
+  double tempo = 0.0;  // beats per minute of a MIDI clock or of JACK; 0: no clock so far
 };
 
 struct Process {
@@ -148,6 +135,9 @@ struct Process {
   void block(std::span<const double* const> inputs, std::span<double* const> outputs,
              std::size_t frames, std::span<const MidiPacket> midi, std::int64_t time_ns) noexcept;
 
+  // Returns the messages to controllers after a block, valid until the next one. [audio] wait-free
+  std::span<const MidiBytes> midi_out() const { return midi_out_; }
+
   // Schedules an event for a frame of the process's own count; false if the queue is full. Offline
   // only, when no other thread calls block(). [audio]
   bool schedule(std::int64_t frame, const Event& event);
@@ -160,6 +150,10 @@ struct Process {
   // Sends events for given frames. They wait in a queue of their own; a panic before their time
   // discards them. [OSC's thread] wait-free
   bool send_ahead(std::span<const TimedEvent> events);
+
+  // Sets the tempo of JACK's transport for the next block, in beats per second; 0: it has none. The
+  // transport and a MIDI clock replace each other's tempo when theirs changes. [audio] wait-free
+  void set_transport_tempo(double beats_per_s) { transport_tempo_ = beats_per_s; }
 
   // Applies a record of a flight before the block that it belongs to; block() then reproduces the
   // original samples. Offline only, for one whole flight, chunk by chunk. [audio]
@@ -177,7 +171,8 @@ struct Process {
   Ring<TimedEvent> from_console{max_now + max_endings};
   Ring<TimedEvent> from_midi{max_now + max_endings};     // written by RtMidi's thread
   Ring<TimedEvent> from_session{max_now + max_endings};  // written by the session's worker
-  Ring<MappingChange> mapping_changes{256};              // written by the session, under its lock
+  TripleBuffer<ControllerMap> controllers{
+      ControllerMap{}};                                  // written by the session, under its lock
   Ring<Report> reports{4096};                            // read by the session's worker
   Ring<RecordedChunk> recording{8192};
   Flag is_recording;
@@ -215,8 +210,9 @@ struct Process {
   void discard_after(std::int64_t frame);
   void collect_due(std::size_t frames);
   void count_event(const Event& event);
-  void apply_mapping_changes();
-  void map_controller(Event& event);
+  bool follow_tempo(Event& event, std::int64_t frame);
+  bool map_controller(Event& event, std::int64_t frame);
+  void follow_present_values();
   void play_models(std::size_t input_count, std::size_t output_count, std::size_t frames);
   void play(PlayingEngine& sounding, std::size_t input_count, std::vector<double>& samples,
             std::size_t frames);
@@ -243,6 +239,10 @@ struct Process {
   std::int64_t frame_ = 0;  // frame of the next sample
   std::uint64_t order_ = 0;
   MidiReader midi_;
+  TickClock tick_clock_;
+  double tempo_ = 0.0;                  // beats per second; 0: no clock so far
+  double transport_tempo_ = 0.0;        // the same, of JACK
+  double known_transport_tempo_ = 0.0;  // the last one that became an event
   PlayingEngine* current_ = nullptr;
   PlayingEngine* fading_ = nullptr;
   PlayingEngine* waiting_ = nullptr;  // follows when the ringing engine has faded out
@@ -271,9 +271,10 @@ struct Process {
   double kept_rate_hz_ = 0.0;
   std::size_t kept_frames_ = 0;
   std::size_t kept_channels_ = 0;
-  std::array<LearnedControl, 128> learned_{};  // [controller]
-  std::vector<Event> due_;                     // events of this chunk, sorted
-  std::vector<Event> matching_;                // the ones that concern one engine
+  ControllerMapper mapper_;
+  std::span<const MidiBytes> midi_out_;
+  std::vector<Event> due_;       // events of this chunk, sorted
+  std::vector<Event> matching_;  // the ones that concern one engine
   std::array<const double*, max_channels> input_pointers_{};
   std::vector<double> input_;       // [channel][chunk_frames]
   std::vector<double> sound_;       // [channel][chunk_frames] output of the current engine

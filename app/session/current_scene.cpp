@@ -55,7 +55,6 @@ std::optional<double> CurrentScene::parameter(const std::string& name) const {
 void CurrentScene::replace(std::shared_ptr<const Loaded> loaded, std::vector<double> values,
                            std::shared_ptr<const std::vector<SceneFile>> files) {
   const std::lock_guard lock(mutex_);
-  const bool is_same = loaded_->path == loaded->path;
   loaded_ = std::move(loaded);
   values_ = std::move(values);
   files_ = std::move(files);
@@ -64,12 +63,7 @@ void CurrentScene::replace(std::shared_ptr<const Loaded> loaded, std::vector<dou
     turned_.push_back(knob.rest);
   }
   waiting_target_.reset();
-  std::erase_if(learned_, [&](const LearnedRow& row) {
-    return !is_same || control_of(row.target).model == 0;
-  });
-  for (const LearnedRow& row : learned_) {
-    send_mapping(row, true);
-  }
+  send_mapping();
 }
 
 void CurrentScene::set_plan(Plan plan) {
@@ -165,22 +159,30 @@ std::optional<LastChange> CurrentScene::take_last_change() {
   return std::exchange(last_change_, std::nullopt);
 }
 
-// Returns the named knob, the parameter or the preset's OSC name; model 0 if there is none of this
-// name.
-LearnedControl CurrentScene::control_of(const std::string& target) const {
+// Returns the target of this name; one that does not exist if the scene has none. An action has no
+// index yet.
+MappedTarget CurrentScene::target_of(const std::string& name) const {
   const Instrument& instrument = loaded_->instrument;
+  if (is_action(name)) {
+    return {.kind = name == "panic" ? EventKind::panic : EventKind::program, .exists = true};
+  }
+  if (const int number = controller_number(name); number >= 0) {
+    return controller_target(number);
+  }
   for (const KnobInfo& knob : instrument.knobs) {
-    if (knob.word == target) {
-      return {.kind = EventKind::controller,
-              .index = static_cast<std::uint16_t>(knob.controller),
-              .model = loaded_->serial};
+    if (knob.word == word_of(name)) {
+      return controller_target(knob.controller);
     }
   }
   for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
     const ParameterInfo& info = instrument.parameters[i];
-    if (info.name == target && info.audio_input == 0) {
+    if (info.name == name && info.audio_input == 0) {
+      const auto index = static_cast<std::uint16_t>(i);
       return {.kind = EventKind::parameter,
-              .index = static_cast<std::uint16_t>(i),
+              .exists = true,
+              .has_parameter = true,
+              .index = index,
+              .parameter = index,
               .model = loaded_->serial,
               .low = info.minimum,
               .high = info.maximum,
@@ -188,24 +190,92 @@ LearnedControl CurrentScene::control_of(const std::string& target) const {
     }
   }
   for (const CustomInfo& info : instrument.custom) {
-    if (info.address == target) {
-      return {.kind = EventKind::custom,
-              .index = static_cast<std::uint16_t>(info.row),
-              .model = loaded_->serial};
+    if (info.address == name) {
+      MappedTarget target{.kind = EventKind::custom,
+                          .exists = true,
+                          .index = static_cast<std::uint16_t>(info.row),
+                          .model = loaded_->serial};
+      show_parameter(ControlSource::osc, 0, name, target);
+      return target;
     }
   }
   return {};
 }
 
-void CurrentScene::send_mapping(const LearnedRow& row, bool is_on) {
-  process_.mapping_changes.push({static_cast<std::uint8_t>(row.controller),
-                                 is_on ? control_of(row.target) : LearnedControl{}});
+// Returns a controller with its present position.
+MappedTarget CurrentScene::controller_target(int number) const {
+  constexpr std::pair<int, double> usual[] = {{7, 100.0 / 127.0}, {10, 0.5}, {11, 1.0}};
+  MappedTarget target{.exists = true, .index = static_cast<std::uint16_t>(number)};
+  for (const auto& [controller, position] : usual) {  // volume, pan and expression
+    target.start = controller == number ? position : target.start;
+  }
+  for (std::size_t i = 0; i < turned_.size(); ++i) {
+    if (loaded_->instrument.knobs[i].controller == number) {
+      target.start = turned_[i];
+    }
+  }
+  show_parameter(ControlSource::controller, number, "", target);
+  return target;
+}
+
+// Finds the parameter that a control of the preset moves. Its value is the position of the knob.
+void CurrentScene::show_parameter(ControlSource source, int number, const std::string& address,
+                                  MappedTarget& target) const {
+  const auto& parameters = loaded_->instrument.parameters;
+  for (const ControlSetting& control : loaded_->preset.controls) {
+    const auto found =
+        std::find_if(parameters.begin(), parameters.end(),
+                     [&](const ParameterInfo& info) { return info.name == control.target; });
+    if (control.source == source && control.number == number && control.address == address &&
+        control.gesture == Gesture::parameter && found != parameters.end()) {
+      target.has_parameter = true;
+      target.parameter = static_cast<std::uint16_t>(found - parameters.begin());
+      target.model = loaded_->serial;
+      target.low = control.low;
+      target.high = control.high;
+      target.exponential = control.exponential;
+      return;
+    }
+  }
+}
+
+std::vector<MappedRow> CurrentScene::rows() const {
+  std::vector<MappedRow> rows;
+  for (const LearnedRow& row : learned_) {
+    const ControllerInput input{.number = static_cast<std::uint16_t>(row.controller)};
+    rows.push_back({{input, row.target}, true, target_of(row.target).exists});
+  }
+  for (const ControllerSetting& setting : controllers_) {
+    rows.push_back({setting, false, target_of(setting.target).exists});
+  }
+  return rows;
+}
+
+std::vector<MappedRow> CurrentScene::mapping() const {
+  const std::lock_guard lock(mutex_);
+  return rows();
+}
+
+// Sends the whole mapping. Of two rows for a message the first acts, so learned ones override.
+void CurrentScene::send_mapping() {
+  ControllerMap& map = process_.controllers.writing();
+  map.count = 0;
+  for (const MappedRow& row : rows()) {
+    MappedController& mapped = map.rows[map.count];
+    mapped = {row.setting.input, target_of(row.setting.target)};
+    if (mapped.target.kind == EventKind::program) {
+      mapped.target.index = static_cast<std::uint16_t>(map.count - learned_.size());
+    }
+    ++map.count;
+  }
+  process_.controllers.publish();
 }
 
 Result<Done> CurrentScene::learn(const std::string& target) {
   const std::uint64_t turns = process_.meters().turns;
   const std::lock_guard lock(mutex_);
-  if (control_of(target).model == 0) {
+  const MappedTarget found = target_of(target);
+  if (!found.exists || is_action(target) || controller_number(target) >= 0) {
     std::vector<std::string> known;
     for (const KnobInfo& knob : loaded_->instrument.knobs) {
       known.push_back(knob.word);
@@ -227,15 +297,10 @@ Result<Done> CurrentScene::learn(const std::string& target) {
 std::size_t CurrentScene::unlearn(const std::string& target) {
   const std::lock_guard lock(mutex_);
   waiting_target_.reset();
-  const auto is_forgotten = [&](const LearnedRow& row) {
-    return target.empty() || row.target == target;
-  };
-  for (const LearnedRow& row : learned_) {
-    if (is_forgotten(row)) {
-      send_mapping(row, false);
-    }
-  }
-  return std::erase_if(learned_, is_forgotten);
+  const std::size_t count = std::erase_if(
+      learned_, [&](const LearnedRow& row) { return target.empty() || row.target == target; });
+  send_mapping();
+  return count;
 }
 
 std::vector<LearnedRow> CurrentScene::learned() const {
@@ -249,16 +314,11 @@ std::optional<LearnedRow> CurrentScene::assign_moved_controller(const Meters& no
     return std::nullopt;
   }
   const LearnedRow row{now.last_controller, *std::exchange(waiting_target_, std::nullopt)};
-  for (const LearnedRow& before : learned_) {
-    if (before.target == row.target) {
-      send_mapping(before, false);
-    }
-  }
   std::erase_if(learned_, [&](const LearnedRow& before) {
     return before.target == row.target || before.controller == row.controller;
   });
   learned_.push_back(row);
-  send_mapping(row, true);
+  send_mapping();
   return row;
 }
 
@@ -271,7 +331,7 @@ Result<std::string> CurrentScene::preset_text(const std::string& model, double e
   PresetChanges changes;
   changes.parameters = changed_settings(loaded_->instrument.parameters, loaded_->preset, values_);
   for (const LearnedRow& row : learned_) {
-    const LearnedControl control = control_of(row.target);
+    const MappedTarget control = target_of(row.target);
     for (const ControlSetting& setting : loaded_->preset.controls) {
       const bool is_knob = control.kind == EventKind::controller &&
                            setting.source == ControlSource::controller &&
@@ -285,7 +345,7 @@ Result<std::string> CurrentScene::preset_text(const std::string& model, double e
         changes.learned.push_back(std::move(same));
       }
     }
-    if (control.kind == EventKind::parameter) {
+    if (control.exists && control.kind == EventKind::parameter) {
       changes.learned.push_back({.source = ControlSource::controller,
                                  .number = row.controller,
                                  .target = row.target,

@@ -1,4 +1,4 @@
-// app/session: the playing scene with a player's changes: parameters, undo, learned controllers.
+// app/session: the playing scene with a player's changes: parameters, undo, mapped controllers.
 #pragma once
 
 #include <chrono>
@@ -14,6 +14,7 @@
 #include "app/realtime/process.h"
 #include "app/session/loader.h"
 #include "core/compile/compile.h"
+#include "core/model/preset/controllers.h"
 
 namespace ressort::session {
 
@@ -38,6 +39,13 @@ struct LearnedRow {
   std::string target;
 };
 
+// A controller of the mapping, and what it does in the playing scene.
+struct MappedRow {
+  ControllerSetting setting;
+  bool is_learned = false;
+  bool exists = false;  // false: the scene has no such parameter or control
+};
+
 // A change that can be undone: the previous values of parameters, after loading `scene` if there is
 // one.
 struct LastChange {
@@ -48,7 +56,9 @@ struct LastChange {
 // All functions: [any thread but audio], unless they say otherwise.
 class CurrentScene {
  public:
-  explicit CurrentScene(Process& process) : process_(process) {}
+  // `controllers`: the user's mapping, which learned controllers override.
+  CurrentScene(Process& process, std::vector<ControllerSetting> controllers)
+      : process_(process), controllers_(std::move(controllers)) {}
 
   // The scene, the values of its parameters and the positions of its knobs at one moment.
   struct Present {
@@ -62,7 +72,7 @@ class CurrentScene {
   std::shared_ptr<const std::vector<SceneFile>> files() const;  // null before the first load
   std::optional<double> parameter(const std::string& name) const;
 
-  // Replaces the scene. Learned controllers survive if it has the same path and the same targets.
+  // Replaces the scene. Mapped controllers move the targets of the same names, if it has them.
   // [worker]
   void replace(std::shared_ptr<const Loaded> loaded, std::vector<double> values,
                std::shared_ptr<const std::vector<SceneFile>> files);
@@ -87,6 +97,10 @@ class CurrentScene {
   // Forgets the controllers of this target, or all if it is empty. Returns how many.
   std::size_t unlearn(const std::string& target);
   std::vector<LearnedRow> learned() const;
+  // Returns all controllers of the mapping, learned ones first.
+  std::vector<MappedRow> mapping() const;
+  // Returns the target of a row of the user's mapping.
+  const std::string& action(std::size_t row) const { return controllers_[row].target; }
   // Gives the waiting target to the controller that has moved. Returns the pair. [worker]
   std::optional<LearnedRow> assign_moved_controller(const Meters& now);
 
@@ -99,11 +113,16 @@ class CurrentScene {
  private:
   // All of these: with the lock held.
   void begin_change(const std::vector<std::string>& names);
-  LearnedControl control_of(const std::string& target) const;
-  void send_mapping(const LearnedRow& row, bool is_on);
+  MappedTarget target_of(const std::string& name) const;
+  MappedTarget controller_target(int number) const;
+  void show_parameter(ControlSource source, int number, const std::string& address,
+                      MappedTarget& target) const;
+  std::vector<MappedRow> rows() const;
+  void send_mapping();
 
   Process& process_;
-  mutable std::mutex mutex_;  // guards all below, and the writing side of process_.mapping_changes
+  const std::vector<ControllerSetting> controllers_;
+  mutable std::mutex mutex_;  // guards all below, and the writing side of process_.controllers
   std::shared_ptr<const Loaded> loaded_ = std::make_shared<Loaded>();
   std::vector<double> values_;  // [parameter]
   std::vector<double> turned_;  // [knob] position at which its controller was last

@@ -329,6 +329,11 @@ std::string cache_folder() {
   return folder_of("XDG_CACHE_HOME", ".cache");
 }
 
+std::string controllers_path() {
+  const std::string folder = folder_of("XDG_CONFIG_HOME", ".config");
+  return folder.empty() ? "" : folder + "/controllers.toml";
+}
+
 namespace {
 
 // Returns the path of a user's file and creates its folder.

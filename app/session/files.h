@@ -64,6 +64,10 @@ Result<std::string> path_of_flight(const std::string& name);
 // ~/.cache. It may not exist. Empty if the home folder is unknown.
 std::string cache_folder();
 
+// Returns the file of the user's mapping of controllers, ressort/controllers.toml in
+// $XDG_CONFIG_HOME or in ~/.config. It may not exist. Empty if the home folder is unknown.
+std::string controllers_path();
+
 // Returns the path to save a preset of this name, and creates its folder. A valid name has 1 to 64
 // letters, digits, spaces and ._- and does not begin with a dot.
 Result<std::string> path_to_save(const std::string& name);

@@ -14,6 +14,7 @@
 #include "app/session/wisdom.h"
 #include "app/session/work_queue.h"
 #include "core/compile/compile.h"
+#include "core/model/preset/controllers.h"
 
 namespace ressort::session {
 
@@ -22,6 +23,7 @@ struct SessionOptions {
   double gain = 1.0;                   // factor on every preset's gain
   std::optional<ThirdArgument> third;  // overrides every model's own meaning
   KeyOptions keys;                     // overrides every preset's tuning
+  std::vector<ControllerSetting> controllers = {};  // the user's mapping
   bool watch = false;                  // reload the playing scene when its files change
   bool keeps_flights = false;          // records flights and saves them after problems
   // The clock that measures forms, and the file that keeps the results. Without a clock no form is

@@ -97,13 +97,14 @@ class Session {
   std::optional<LastChange> take_last_change() { return current_.take_last_change(); }
 
   // MIDI learn: the next knob that moves controls the preset's knob of this name, this parameter,
-  // or the control with this OSC name, instead of its function in the preset. Pedals, bank select
-  // and the like do not count. The pair is reported to `on_message`, and lasts until another scene
-  // is loaded.
+  // or the control with this OSC name, instead of its other function. Pedals, bank select and the
+  // like do not count. The pair is reported to `on_message`. It also acts in the next scenes that
+  // have the same target.
   Result<Done> learn(const std::string& target) { return current_.learn(target); }
   // Forgets the controllers of this target, or all if it is empty. Returns how many.
   std::size_t unlearn(const std::string& target) { return current_.unlearn(target); }
   std::vector<LearnedRow> learned() const { return current_.learned(); }
+  std::vector<MappedRow> mapping() const { return current_.mapping(); }
 
   // Saves the playing scene with its present values as a preset of the user, and returns its path.
   // See path_to_save(). A name that exists, even as a preset of the program, needs

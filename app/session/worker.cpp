@@ -125,18 +125,39 @@ void Worker::change_program(int number) {
   const std::string program = "program " + std::to_string(number % 128 + 1);
   const auto index = static_cast<std::size_t>(number);
   if (index < presets.size()) {
-    const auto answer = [this, name = presets[index], program](const auto& result) {
-      if (result) {
-        on_message_(program + ": " + name);
-      } else if (result.error().message != replaced && result.error().message != ending) {
-        on_message_(result.error().message);
-      }
-    };
-    queue_.add(
-        LoadJob{{.name = presets[index], .reach = Reach::own_folders, .lets_ring = true}, answer});
+    load_preset(presets[index], program);
   } else if (unknown_programs_.insert(number).second) {
     on_message_("there is no " + program + " in bank " + std::to_string(number / 128) +
                 "; there are " + counted(presets.size(), "preset", "presets"));
+  }
+}
+
+// Loads a preset as a program change does: the old sound rings on.
+void Worker::load_preset(const std::string& name, const std::string& reason) {
+  const auto answer = [this, name, reason](const auto& result) {
+    if (result) {
+      on_message_(reason + ": " + name);
+    } else if (result.error().message != replaced && result.error().message != ending) {
+      on_message_(result.error().message);
+    }
+  };
+  queue_.add(LoadJob{{.name = name, .reach = Reach::own_folders, .lets_ring = true}, answer});
+}
+
+// Does what a button of the mapping asks for: next, previous or load.
+void Worker::press(const std::string& action) {
+  if (action == "next" || action == "previous") {
+    return load_preset(preset_beside(queue_.newest_load(), action == "next" ? 1 : -1), action);
+  }
+  const std::string name = action.substr(action.find(' ') + 1);
+  const std::vector<std::string> presets = known_presets();
+  double number = 0.0;
+  if (!parse_number(name, number)) {
+    load_preset(name, action);
+  } else if (number >= 1.0 && number <= static_cast<double>(presets.size())) {
+    load_preset(presets[static_cast<std::size_t>(number) - 1], action);
+  } else {
+    on_message_("'" + action + "': there are " + counted(presets.size(), "preset", "presets"));
   }
 }
 
@@ -159,6 +180,8 @@ void Worker::read_reports() {
       problems_.add_overload(report);
     } else if (report.kind == Report::Kind::program) {
       program = static_cast<int>(report.value);
+    } else if (report.kind == Report::Kind::action) {
+      press(current_.action(report.index));
     }
   }
   if (program) {

@@ -37,6 +37,8 @@ class Worker {
   void rebuild_at_new_rate();
   void read_reports();
   void change_program(int number);
+  void load_preset(const std::string& name, const std::string& reason);
+  void press(const std::string& action);
 
   // Reloads the playing scene after an edit.
   void reload();

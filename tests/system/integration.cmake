@@ -5,7 +5,7 @@ target_compile_options(rtspy PRIVATE -Wno-conversion -Wno-nonnull-compare)
 target_link_libraries(rtspy PRIVATE PkgConfig::JACK ${CMAKE_DL_LIBS})
 
 add_ressort_tests(ressort_server_tests system/server_test.cpp system/callback_test.cpp
-  system/connections_test.cpp system/nsm_test.cpp system/soak_test.cpp)
+  system/connections_test.cpp system/controllers_test.cpp system/nsm_test.cpp system/soak_test.cpp)
 target_link_libraries(ressort_server_tests PRIVATE PkgConfig::JACK PkgConfig::LIBLO Threads::Threads)
 target_compile_definitions(ressort_server_tests PRIVATE
   RESSORT_PROGRAM="$<TARGET_FILE:ressort>" RESSORT_SPY="$<TARGET_FILE:rtspy>"
@@ -14,7 +14,7 @@ ressort_compile_like(ressort_server_tests ressort_tests)
 add_dependencies(ressort_server_tests ressort rtspy)
 
 # A sanitizer has its own malloc, which the spy library cannot replace.
-set(server_tags jack_midi shared_notes osc_time flood rtmidi alsa server_loss nsm)
+set(server_tags controllers jack_midi shared_notes osc_time flood rtmidi alsa server_loss nsm)
 if(NOT RESSORT_ADDRESS_SANITIZER AND NOT RESSORT_THREAD_SANITIZER)
   list(APPEND server_tags callback)
 endif()

@@ -143,6 +143,7 @@ inline void use_test_server() {
   setenv("JACK_NO_AUDIO_RESERVATION", "1", 1);
   // Keeps the user's own data untouched.
   setenv("XDG_DATA_HOME", ("/tmp/ressort-data-" + std::to_string(getpid())).c_str(), 1);
+  setenv("XDG_CONFIG_HOME", ("/tmp/ressort-config-" + std::to_string(getpid())).c_str(), 1);
   jack_set_error_function([](const char*) {});
   jack_set_info_function([](const char*) {});
 }

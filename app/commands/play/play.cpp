@@ -2,9 +2,11 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <future>
 #include <mutex>
 #include <optional>
@@ -73,6 +75,14 @@ class Player {
     if (is_flight_name(options_.name)) {
       return play_flight();
     }
+    auto controllers = read_controllers();
+    if (!controllers) {
+      complain(controllers.error().message);
+      return exit_code::wrong_use;
+    }
+    options_.device.sends_midi =
+        std::any_of(controllers->begin(), controllers->end(),
+                    [](const ControllerSetting& setting) { return setting.input.sends; });
     if (const int failure = join_manager(); failure != exit_code::done || has_called_off_) {
       return failure;
     }
@@ -115,6 +125,7 @@ class Player {
                                                  .gain = std::pow(10.0, options_.gain_db / 20.0),
                                                  .third = options_.third,
                                                  .keys = options_.keys,
+                                                 .controllers = *std::move(controllers),
                                                  .watch = options_.watch,
                                                  .keeps_flights = true,
                                                  .time = cpu_time_ns,
@@ -175,6 +186,29 @@ class Player {
   }
 
  private:
+  // Reads the mapping of controllers. All errors are in one message.
+  Result<std::vector<ControllerSetting>> read_controllers() const {
+    const bool is_given = !options_.controllers.empty();
+    const std::string path = is_given ? options_.controllers : controllers_path();
+    std::error_code error;
+    if (!is_given && !std::filesystem::exists(path, error)) {
+      return std::vector<ControllerSetting>();
+    }
+    const auto text = read_text(path, max_preset_bytes);
+    if (!text) {
+      return text.error();
+    }
+    ParsedControllers read = parse_controllers(*text);
+    if (read.ok()) {
+      return std::move(read.rows);
+    }
+    std::vector<std::string> lines;
+    for (const Error& wrong : read.errors) {
+      lines.push_back(with_source(finding_of(path, *text, wrong)));
+    }
+    return Error{joined(lines, "\n")};
+  }
+
   int open_device() {
     auto device = open_audio(options_.audio, process_, options_.device);
     if (!device) {
@@ -346,6 +380,9 @@ class Player {
   void greet(const Loaded& loaded) {
     if (!device_.note.empty()) {
       voice_.say(device_.note);
+    }
+    if (options_.device.sends_midi && device_.kind != "jack") {
+      voice_.say("'send' in the mapping of controllers needs JACK; nothing is sent");
     }
     if (device_.kind != "dummy" && !may_raise_priority()) {
       voice_.say(

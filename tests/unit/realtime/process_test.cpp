@@ -40,6 +40,36 @@ TEST_CASE("MIDI acts at its exact frame for any block length", "[process]") {
   }
 }
 
+// 24 ticks in a beat: at 150 beats per minute 735 frames of 44.1 kHz from tick to tick.
+TEST_CASE("a MIDI clock and JACK's transport set the tempo", "[process]") {
+  Harness harness;
+  const std::vector<std::uint8_t> tick = {0xf8};
+  const auto play_ticks = [&](std::size_t count, double length, double jitter) {
+    std::vector<MidiPacket> packets;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double late = i % 2 == 0 ? 0.0 : jitter;
+      packets.push_back({static_cast<std::uint32_t>(length * static_cast<double>(i) + late), tick});
+    }
+    const auto frames = static_cast<std::size_t>(length * static_cast<double>(count));
+    harness.run(frames, frames, packets);
+    return harness.process.meters().tempo;
+  };
+  CHECK(play_ticks(6, 735.0, 0.0) == 0.0);  // too few
+  CHECK(play_ticks(30, 735.0, 0.0) == Approx(150.0).epsilon(1e-9));
+  // A whole beat later nothing of the old tempo is left; ticks that are late by 64 frames and in
+  // time by turns change the mean of 24 of them by at most 64 / (24 * 918.75) = 0.29 %.
+  CHECK(play_ticks(48, 918.75, 64.0) == Approx(120.0).epsilon(0.0030));
+  harness.run(44100);  // a pause of a second, longer than between two ticks
+  CHECK(play_ticks(7, 1837.5, 0.0) == Approx(60.0).epsilon(1e-3));
+  harness.process.set_transport_tempo(1.5);
+  harness.run(256);
+  CHECK(harness.process.meters().tempo == 90.0);
+  harness.process.set_transport_tempo(0.0);  // the transport's master has left
+  harness.run(256);
+  CHECK(harness.process.meters().tempo == 90.0);
+  CHECK(harness.heap_calls == 0);
+}
+
 TEST_CASE("an event acts at its frame, and a late event acts at once", "[process]") {
   Harness harness;
   Preset faint;  // a larger drift would look like an unstable voice

@@ -91,11 +91,38 @@ TEST_CASE(
   CHECK(has(h.say("load \"MY OWN\""), "my own: 3 masses"));
   h.play();
   CHECK(*h.session.parameter("m_K") == 0.125);
-  CHECK(h.session.learned().empty());  // now it belongs to the preset
+  h.say("unlearn");  // now it belongs to the preset
+  CHECK(h.session.learned().empty());
   turn(h, 33, 1.0);
   CHECK(becomes_true(h, [&] { return h.session.parameter("m_K") == 0.2; }));
   // OSC may load the user's presets too.
   CHECK(find_scene("my own", Reach::own_folders));
+}
+
+TEST_CASE("a learned knob acts in every sound that has its parameter", "[keeping]") {
+  LoadedHarness fixture;
+  Harness& h = fixture.harness;
+  fixture.data.write("presets/tri2.toml", triangle_preset);
+  fixture.data.write("models/mass.mdl",
+                     "@g ground 0.\n@m mass 1. 0. 0.\n@l springDamper @g @m 0.1 0.0001\n"
+                     "@in1 frcInput @m\n@out1 posOutput @m\n");
+  h.say("learn m_K");
+  turn(h, 21, 0.5);
+  REQUIRE(becomes_true(h, [&] { return h.session.learned().size() == 1; }));
+  REQUIRE(has(h.say("load tri2"), "tri2: 3 masses"));
+  h.loudest(12);
+  turn(h, 21, 1.0);
+  CHECK(becomes_true(h, [&] { return h.session.parameter("m_K") == 0.2; }));
+  CHECK(has(h.say("explain"), "controls m_K, learned"));
+  REQUIRE(has(h.say("load mass"), "mass: 1 mass"));
+  h.loudest(12);  // until the crossfade is over
+  CHECK(has(h.say("explain"), "mapped to m_K, which this sound does not have"));
+  turn(h, 21, 0.25);
+  REQUIRE(has(h.say("load tri"), "tri: 3 masses"));
+  h.loudest(12);
+  CHECK(h.session.parameter("m_K") == 0.1);
+  turn(h, 21, 0.0);
+  CHECK(becomes_true(h, [&] { return h.session.parameter("m_K") == 0.01; }));
 }
 
 TEST_CASE("a model without a preset is saved as a preset", "[keeping]") {
