@@ -188,6 +188,8 @@ TEST_CASE("each stop of a morph sounds as its preset does", "[morph]") {
     there.preset.controls = alone.preset.controls;
     there.preset.gain = 1.0;
     alone.preset.transpose = there.preset.transpose = 0;
+    alone.preset.hardness = there.preset.hardness = "";
+    alone.preset.lfos.clear();
     const auto expected = heard(alone, {note_on(0, 60)});
     const auto found = heard(there, {parameter(0, index, stop), note_on(0, 60)});
     for (std::size_t c = 0; c < 2; ++c) {
