@@ -103,6 +103,10 @@ Result<Done> command::undo(ConsoleContext& console, Words) {
 
 Result<Done> control_song(Session& session, const std::string& word,
                           std::span<const Argument> numbers) {
+  const Argument clock = std::string("clock");
+  if (word == "tempo" && numbers.size() == 1 && numbers[0] == clock) {
+    return session.song().follow_clock();
+  }
   std::vector<double> given;
   for (const Argument& number : numbers) {
     if (!std::holds_alternative<double>(number)) {
@@ -123,7 +127,7 @@ Result<Done> control_song(Session& session, const std::string& word,
   if (word == "loop" && given.size() != 1 && given.size() <= 2) {
     return given.empty() ? song.loop(0.0, 0.0) : song.loop(given[0], given[1]);
   }
-  return Error{"expected play [SECONDS], pause, tempo PERCENT, or loop [FROM TO]"};
+  return Error{"expected play [SECONDS], pause, tempo PERCENT, tempo clock, or loop [FROM TO]"};
 }
 
 Result<Done> command::song(ConsoleContext& console, Words words) {

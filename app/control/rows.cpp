@@ -465,9 +465,9 @@ std::vector<Row> make_rows() {
        .act = command::shape},
       {.address = "/subscribe",
        .arguments = {{"SECONDS", "the seconds", 0, Subscribers::longest_lease_s, 10}, port},
-       .does =
-           "sends the current state, then every change as /loaded, /param/NAME and "
-           "/control/NAME, for SECONDS, at most 60 (10), to PORT (the sender's); repeat it to renew",
+       .does = "sends the current state, then every change as /loaded, /param/NAME and "
+               "/control/NAME, for SECONDS, at most 60 (10), to PORT (the sender's); repeat it to "
+               "renew",
        .answer = answer::subscribe},
       {.address = "/unsubscribe",
        .arguments = {port},
@@ -507,12 +507,14 @@ std::vector<Row> make_rows() {
        .command_does = "plays, pauses or repeats the MIDI file of --midi",
        .details =
            "song play [SECONDS] continues, or plays from this second; song tempo PERCENT, 10 "
-           "to 1000;\nsong loop FROM TO repeats these seconds, song loop ends that.",
+           "to 1000,\nor clock, a MIDI clock's; song loop FROM TO repeats these seconds, song loop "
+           "ends that.",
        .act = command::song},
       {.address = "/song/pause", .does = "pauses the MIDI file", .answer = answer::song},
       {.address = "/song/tempo",
        .arguments = {{"PERCENT", "the tempo", 10, 1000}},
-       .does = "sets the tempo of the MIDI file, in percent of its own",
+       .does =
+           "sets the tempo of the MIDI file in percent of its own, or to that of a MIDI 'clock'",
        .answer = answer::song},
       {.address = "/song/loop",
        .arguments = {{"FROM", "the first second", 0, 86400, 0}, {"TO", "the last", 0, 86400, 0}},

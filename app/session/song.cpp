@@ -52,7 +52,29 @@ Result<Done> Song::set_tempo(double tempo) {
     return Error{"the tempo must lie between " + print_number(100.0 * least_tempo) + " and " +
                  print_number(100.0 * most_tempo) + " %"};
   }
-  return change(false, [&](State& state) { state.tempo = tempo; });
+  return change(false, [&](State& state) {
+    state.tempo = tempo;
+    follows_clock_ = false;
+  });
+}
+
+Result<Done> Song::follow_clock() {
+  return change(false, [&](State&) { follows_clock_ = true; });
+}
+
+void Song::clock(double beats_per_minute) {
+  {
+    const std::lock_guard lock(mutex_);
+    const double tempo = beats_per_minute / beats_per_minute_;
+    constexpr double least_change = 1e-4;
+    if (!follows_clock_ || tempo < least_tempo || tempo > most_tempo ||
+        std::fabs(tempo - state_.tempo) < least_change * state_.tempo) {
+      return;
+    }
+  }
+  static_cast<void>(change(false, [&](State& state) {
+    state.tempo = follows_clock_ ? beats_per_minute / beats_per_minute_ : state.tempo;
+  }));
 }
 
 Result<Done> Song::loop(double from_s, double to_s) {
@@ -75,7 +97,8 @@ std::string Song::description() const {
   const std::lock_guard lock(mutex_);
   std::string text = (state_.plays ? "playing at " : "paused at ") +
                      fixed(std::min(state_.position_s(Clock::now()), length_s_), 1) + " of " +
-                     fixed(length_s_, 1) + " s, tempo " + fixed(100.0 * state_.tempo, 0) + " %";
+                     fixed(length_s_, 1) + " s, tempo " + fixed(100.0 * state_.tempo, 0) + " %" +
+                     (follows_clock_ ? " by the clock" : "");
   if (state_.loop_to_s > state_.loop_from_s) {
     text += ", loop from " + print_number(state_.loop_from_s) + " to " +
             print_number(state_.loop_to_s) + " s";
@@ -83,8 +106,9 @@ std::string Song::description() const {
   return is_over_ ? "the end, after " + fixed(length_s_, 1) + " s" : text;
 }
 
-void Song::begin(double length_s, bool is_paused) {
+void Song::begin(double length_s, double beats_per_minute, bool is_paused) {
   const std::lock_guard lock(mutex_);
+  beats_per_minute_ = beats_per_minute;
   length_s_ = length_s;
   state_.plays = !is_paused;
   state_.at = Clock::now();

@@ -41,13 +41,16 @@ class Song {
   Result<Done> play(std::optional<double> from_s);
   Result<Done> pause();
   Result<Done> set_tempo(double tempo);           // 1 is the file's.
+  Result<Done> follow_clock();                    // The tempo is that of clock() from now on.
   Result<Done> loop(double from_s, double to_s);  // The same number twice ends the loop.
 
   bool is_over() const;             // True from the end of the file on, until play().
   std::string description() const;  // Returns for example "12.5 of 180 s, tempo 80 %".
 
   // For the player. [its thread]
-  void begin(double length_s, bool is_paused);
+  void begin(double length_s, double beats_per_minute, bool is_paused);
+  // Tells the tempo of a MIDI clock or of JACK's transport, or 0 if there is none.
+  void clock(double beats_per_minute);
   State state() const;
   // Waits until this time. Returns false as soon as the state differs from `known`.
   bool wait_until(Clock::time_point time, const State& known);
@@ -62,7 +65,9 @@ class Song {
   mutable std::mutex mutex_;  // guards all below
   std::condition_variable wake_;
   State state_;
-  double length_s_ = -1.0;  // negative: no song
+  double length_s_ = -1.0;           // negative: no song
+  double beats_per_minute_ = 120.0;  // of the file
+  bool follows_clock_ = false;
   bool is_over_ = false;
 };
 

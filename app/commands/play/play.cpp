@@ -157,7 +157,7 @@ class Player {
     if (song) {
       voice_.say("playing " + counted(song->messages.size(), "message", "messages") + " of MIDI, " +
                  fixed(song->length_s, 1) + " s");
-      session_->song().begin(song->length_s, options_.is_paused);
+      session_->song().begin(song->length_s, song->beats_per_minute, options_.is_paused);
       player_.emplace(*std::move(song), door_, session_->song());
     }
     return converse();
@@ -540,6 +540,7 @@ class Player {
           return exit_code::done;
         }
       }
+      session_->song().clock(process_.meters().tempo);
       if (options_.no_console && player_ && session_->song().is_over() && has_fallen_silent()) {
         return exit_code::done;
       }

@@ -373,6 +373,7 @@ Result<MidiFile> parse_midi_file(Bytes file) {
         if (division.tick_s == 0.0) {
           tick_s = 1e-6 * event.count / division.ticks_per_quarter;
         }
+        midi.beats_per_minute = tick == 0 ? 6e7 / event.count : midi.beats_per_minute;
         break;
       case TrackEvent::Kind::end:
         break;

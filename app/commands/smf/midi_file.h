@@ -23,6 +23,7 @@ struct MidiFile {
   };
   std::vector<Message> messages;      // messages of all tracks, sorted by time, then by track
   std::vector<std::uint8_t> bytes;    // bytes of the messages, each with its status byte
+  double beats_per_minute = 120.0;    // at the start
   double length_s = 0.0;              // time of the last event, ends of tracks included
   std::vector<std::string> warnings;  // damage that was read over
 

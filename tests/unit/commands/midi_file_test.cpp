@@ -75,6 +75,10 @@ TEST_CASE("Running status, a tempo change and long times are parsed", "[midi_fil
   check(midi, 4, 2.75, {0xc3, 7});
   check(midi, 5, 2.75, {0x83, 62, 64});  // the file leaves this key down
   CHECK(std::fabs(midi.length_s - 2.75) < 1e-12);
+  CHECK(midi.beats_per_minute == 120.0);
+  const MidiFile slow = read(
+      header(0, 1, 96) + track(Bytes{0, 0xff, 0x51, 3, 0x0f, 0x42, 0x40, 0, 0x93, 60, 100} + end));
+  CHECK(slow.beats_per_minute == Approx(60.0));
 }
 
 TEST_CASE("Tracks of type 1 play together, with the tempo of any track", "[midi_file]") {

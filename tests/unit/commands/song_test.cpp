@@ -31,7 +31,7 @@ struct Stage {
   explicit Stage(std::array<double, 3> times_s)
       : player(begun(harness.session.song(), three_notes(times_s)), door, harness.session.song()) {}
   static MidiFile begun(Song& song, MidiFile file) {
-    song.begin(file.length_s, false);
+    song.begin(file.length_s, 120.0, false);
     return file;
   }
 
@@ -88,6 +88,22 @@ TEST_CASE("a song's position follows its tempo", "[song]") {
   CHECK(state.time_of(16.0) == later);
   state.plays = false;
   CHECK(state.position_s(later) == 10.0);
+}
+
+// A file of 120 beats a minute plays at a quarter more of its speed by a clock of 150.
+TEST_CASE("a song follows a clock", "[song]") {
+  Stage stage({0.0, 100.0, 200.0});
+  Song& song = stage.harness.session.song();
+  song.clock(150.0);
+  CHECK(song.state().tempo == 1.0);
+  CHECK(has(stage.harness.say("song tempo clock"), "by the clock"));
+  song.clock(0.0);  // There is none.
+  CHECK(song.state().tempo == 1.0);
+  song.clock(150.0);
+  CHECK(song.state().tempo == Approx(1.25).epsilon(1e-12));
+  stage.harness.say("song tempo 80");
+  song.clock(150.0);
+  CHECK(song.state().tempo == Approx(0.8).epsilon(1e-12));
 }
 
 TEST_CASE("a wrong command of a song is an error", "[song]") {
