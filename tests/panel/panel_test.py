@@ -230,6 +230,37 @@ def on_picture(browser, name):
     return x, y
 
 
+def click(browser, x, y):
+    browser.mouse("mousePressed", x, y)
+    browser.mouse("mouseMoved", x, y - 60)
+    browser.mouse("mouseReleased", x, y - 60)
+
+
+def heard(browser):
+    """Returns the amplitudes at 149 and 447 Hz of the loudest of six windows of the sound."""
+    return browser.evaluate("""new Promise(done => {
+      let most = [0, 0], shown = panel.frames, left = 6;
+      const until = performance.now() + 10000;
+      (function look() {
+        if (panel.frames !== shown) {
+          shown = panel.frames;
+          --left;
+          const now = [148.9, 446.7].map(hz => {
+            const y = panel.heard, w = 2 * Math.PI * hz / 48000;
+            let re = 0, im = 0;
+            y.forEach((v, n) => {
+              const hann = 0.5 - 0.5 * Math.cos(2 * Math.PI * n / y.length);
+              re += hann * v * Math.cos(w * n); im += hann * v * Math.sin(w * n);
+            });
+            return Math.hypot(re, im);
+          });
+          if (now[0] + now[1] > most[0] + most[1]) most = now;
+        }
+        if (left > 0 && performance.now() < until) requestAnimationFrame(look); else done(most);
+      })();
+    })""")
+
+
 def strikes(program, browser, names):
     """Strikes masses without an input on the picture and compares the pitches: 149 and 447 Hz."""
     tones = {}
@@ -237,9 +268,7 @@ def strikes(program, browser, names):
         check(silence(program, browser), f"silence before {name} is struck")
         x, y = on_picture(browser, name)
         check(hint(browser).startswith(name), f"the hint says that a click strikes {name}")
-        browser.mouse("mousePressed", x, y)
-        browser.mouse("mouseMoved", x, y - 60)
-        browser.mouse("mouseReleased", x, y - 60)
+        click(browser, x, y)
         check(browser.eventually("panel.status.peak_db > -60"), f"{name} is heard")
         if "_" in name:  # a pendulum has few other frequencies
             check(browser.eventually(f"Math.abs(panel.status.centroid_hz - {hz}) < 30"),
@@ -247,27 +276,11 @@ def strikes(program, browser, names):
         # Both masses together vibrate at sqrt(K/2) per sample, 44 100 of them a second: 149 and 447 Hz.
         # The loudest of the next windows is compared: the first may hold the end of the silence, and
         # on a slow machine the tone may have decayed in the last.
-        tones[name] = browser.evaluate("""new Promise(done => {
-          let most = [0, 0], shown = panel.frames, left = 6;
-          const until = performance.now() + 10000;
-          (function look() {
-            if (panel.frames !== shown) {
-              shown = panel.frames;
-              --left;
-              const now = [148.9, 446.7].map(hz => {
-                const y = panel.heard, w = 2 * Math.PI * hz / 48000;
-                let re = 0, im = 0;
-                y.forEach((v, n) => {
-                  const hann = 0.5 - 0.5 * Math.cos(2 * Math.PI * n / y.length);
-                  re += hann * v * Math.cos(w * n); im += hann * v * Math.sin(w * n);
-                });
-                return Math.hypot(re, im);
-              });
-              if (now[0] + now[1] > most[0] + most[1]) most = now;
-            }
-            if (left > 0 && performance.now() < until) requestAnimationFrame(look); else done(most);
-          })();
-        })""")
+        for _ in range(3):  # Strikes again if the tone had decayed before the first window.
+            tones[name] = heard(browser)
+            if sum(tones[name]) > 0:
+                break
+            click(browser, x, y)
     print("        " + str(tones))
     low, high = (tones[name] for name in names)
     check(low[0] > 10 * low[1], "the low one is heard at 149 Hz")

@@ -63,7 +63,7 @@ expect 2 'found a zero byte' "$program" body binary.mdl
 model text.wav 'no sound at all'
 expect 2 "'text.wav' is not a readable sound file" "$program" body text.wav
 printf '0 /note/on 60 100\n' > blow.txt
-expect 0 "blow.flac" "$program" render Marimba --score blow.txt -s 2 -o blow.flac
+expect 0 "blow.flac" "$program" render BarMetals --score blow.txt -s 2 -o blow.flac
 expect 0 "@blow body 40 hit left right" "$program" body blow.flac
 expect 0 "modes from 26" "$program" body blow.flac -o rings.mdl --picture rings.svg
 expect 0 "@out2 posOutput [@rings right]" cat rings.mdl
@@ -129,7 +129,7 @@ expect 0 '"attack_ms"' "$program" shape free.mdl --attack 8 --json
 expect 2 "must be a number above 0" "$program" shape free.mdl --attack 0
 expect 0 '"k": "highest"' "$program" shape free.mdl --f0 20000 --json
 expect 0 "key 60 (C4 +0)" "$program" shape PolyTriangle --note 60 --centroid 400 --json
-expect 0 "is as dark as it gets with the other targets" "$program" shape free.mdl --like blow.flac --t60 3
+expect 0 "is as bright as it gets with the other targets" "$program" shape free.mdl --like blow.flac --t60 3
 expect 2 "keys set the pitch of PolyTriangle" "$program" shape PolyTriangle --f0 100
 expect 2 "bar.mdl:1:1: error: there is no parameter to adjust" "$program" shape bar.mdl --t60 3
 expect 2 "here is a bow" "$program" shape BowedString --t60 3

@@ -195,6 +195,7 @@ TEST_CASE("encoders, pickup, pairs, NRPNs and buttons act through JACK", "[contr
   }
   CHECK(desk.reaches(Desk::high));
   CHECK(desk.answers("set k 0.1", "k = 0.1"));
+  CHECK(desk.stays(0.1));  // until the audio thread has it
   surface.send({turn(20, 65)});
   CHECK(desk.reaches(0.101));
 
@@ -214,6 +215,7 @@ TEST_CASE("encoders, pickup, pairs, NRPNs and buttons act through JACK", "[contr
 
   // By the preset's own controller, from the present value.
   CHECK(desk.answers("set k 0.1", "k = 0.1"));
+  CHECK(desk.stays(0.1));  // until the audio thread has it
   surface.send({turn(23, 127), turn(23, 127)});
   CHECK(desk.reaches(0.098));
 

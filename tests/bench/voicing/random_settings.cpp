@@ -22,6 +22,7 @@ constexpr double long_lift_s = 2.2;
 constexpr double pedals_up_s = 0.2;  // after the key
 constexpr double after_s = 2.0;
 constexpr double undamped_after_s = 16.0;  // for presets without damper, which must ring out
+constexpr double body_after_s = 4.0;       // for a body, which no damper touches
 
 constexpr double loudest_db = 0.0;
 constexpr double softest_db = -40.0;
@@ -223,8 +224,10 @@ int play_random_settings(Player& player, const std::string& name, int count, std
       const double end_s = static_cast<double>(sound.size()) / sound.rate_hz;
       return decibels(peak_of(sound.part(end_s - 0.2, end_s)) / std::max(peak, 1e-9));
     };
-    // A preset without damper must ring out by itself.
-    for (double more_s = preset.damper_s > 0.0 ? 0.0 : undamped_after_s;
+    // A preset without damper, and a body, which no damper touches, must ring out by themselves.
+    for (double more_s = preset.damper_s <= 0.0    ? undamped_after_s
+                         : !preset.through.empty() ? body_after_s
+                                                   : 0.0;
          left_db() > silence_db && more_s > 0.0; more_s -= 2.0) {
       sound = player.continue_playing(2.0);
     }
