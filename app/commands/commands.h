@@ -37,7 +37,7 @@ struct PlayOptions {
   bool is_paused = false;  // the MIDI file waits for the command `song play`
   std::string script;
   std::string controllers;  // file of the mapping; empty: the user's, if there is one
-  OscOptions osc;  // port 0: none
+  OscOptions osc;           // port 0: none
   PanelOptions panel;
   bool exit_on_loss = false;
   bool watch = false;  // reloads the scene when its files change

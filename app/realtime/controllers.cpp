@@ -33,19 +33,6 @@ double at_end(double position) {
 
 }  // namespace
 
-double MappedTarget::value_at(double position) const {
-  return exponential ? low * std::pow(high / low, position) : low + position * (high - low);
-}
-
-double MappedTarget::position_of(double value) const {
-  if (low == high || (exponential && value <= 0.0)) {
-    return 0.0;
-  }
-  const double position =
-      exponential ? std::log(value / low) / std::log(high / low) : (value - low) / (high - low);
-  return std::clamp(position, 0.0, 1.0);
-}
-
 void ControllerMapper::use(const ControllerMap& map) {
   map_ = &map;
   for (std::size_t row = 0; row < map.count; ++row) {
@@ -91,7 +78,7 @@ ControllerMapper::Result ControllerMapper::map(Event& event) {
            .channel = event.channel,
            .index = target.index,
            .model = is_controller ? 0 : target.model,
-           .value = target.kind == EventKind::parameter ? target.value_at(next) : next};
+           .value = target.kind == EventKind::parameter ? target.range.value_at(next) : next};
   return target.kind == EventKind::program ? Result::action : Result::mapped;
 }
 
@@ -223,7 +210,7 @@ bool ControllerMapper::meets(const Move& move, double present) {
 double ControllerMapper::position(std::size_t row) const {
   const MappedTarget& target = map_->rows[row].target;
   return target.has_parameter && !states_[row].is_newer && engine_ != nullptr
-             ? target.position_of(engine_->parameter(target.parameter))
+             ? target.range.position_of(engine_->parameter(target.parameter))
              : states_[row].position;
 }
 
@@ -232,7 +219,7 @@ void ControllerMapper::follow(const Event& event) {
     const MappedTarget& target = map_->rows[row].target;
     if (target.kind == event.kind && target.index == event.index && exists(target)) {
       states_[row].position =
-          event.kind == EventKind::parameter ? target.position_of(event.value) : event.value;
+          event.kind == EventKind::parameter ? target.range.position_of(event.value) : event.value;
       states_[row].is_newer = true;
     }
   }

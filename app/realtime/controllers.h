@@ -9,6 +9,7 @@
 #include "app/rooms.h"
 #include "core/controller.h"
 #include "core/engine/engine.h"
+#include "core/knob_range.h"
 
 namespace ressort::realtime {
 
@@ -22,13 +23,7 @@ struct MappedTarget {
   std::uint16_t parameter = 0;  // the parameter that shows the present value
   std::uint32_t model = 0;      // serial of the model of `index` and `parameter`; 0: any model
   double start = 0.0;           // present position, if no parameter shows it
-  double low = 0.0;             // the parameter's value at position 0 of the knob
-  double high = 1.0;
-  bool exponential = false;  // equal steps of the knob are equal ratios
-
-  // Returns the parameter's value at a position 0..1 of the knob, and the reverse.
-  double value_at(double position) const;
-  double position_of(double value) const;
+  KnobRange range;              // of the parameter
 };
 
 struct MappedController {
@@ -105,8 +100,8 @@ class ControllerMapper {
   const Engine* engine_ = nullptr;
   std::uint32_t model_ = 0;
   std::array<State, ControllerMap::most_rows> states_{};
-  std::array<Number, 16> numbers_{};       // [channel]
-  std::array<int, 32> coarse_{};           // [controller] high half of a value of 14 bits
+  std::array<Number, 16> numbers_{};  // [channel]
+  std::array<int, 32> coarse_{};      // [controller] high half of a value of 14 bits
   std::array<MidiBytes, 4 * ControllerMap::most_rows> messages_{};
   std::size_t message_count_ = 0;
 };

@@ -172,8 +172,8 @@ struct Process {
   Ring<TimedEvent> from_midi{max_now + max_endings};     // written by RtMidi's thread
   Ring<TimedEvent> from_session{max_now + max_endings};  // written by the session's worker
   TripleBuffer<ControllerMap> controllers{
-      ControllerMap{}};                                  // written by the session, under its lock
-  Ring<Report> reports{4096};                            // read by the session's worker
+      ControllerMap{}};        // written by the session, under its lock
+  Ring<Report> reports{4096};  // read by the session's worker
   Ring<RecordedChunk> recording{8192};
   Flag is_recording;
   Ring<RecordedChunk> listening{1024};  // read by the timbre analysis

@@ -26,7 +26,7 @@ CurrentScene::Present CurrentScene::present() const {
   Present now{loaded_, values_, turned_};
   for (std::size_t i = 0; i < turned_.size(); ++i) {
     const KnobInfo& knob = loaded_->instrument.knobs[i];
-    now.knobs[i] = knob.parameter ? knob.position_of(values_[*knob.parameter]) : turned_[i];
+    now.knobs[i] = knob.parameter ? knob.range.position_of(values_[*knob.parameter]) : turned_[i];
   }
   return now;
 }
@@ -89,7 +89,7 @@ void CurrentScene::remember(std::span<const TimedEvent> events) {
       if (knob.controller == event.index) {
         turned_[i] = event.value;
         if (knob.parameter) {
-          changes.emplace_back(*knob.parameter, knob.value_at(event.value));
+          changes.emplace_back(*knob.parameter, knob.range.value_at(event.value));
         }
       }
     }
@@ -184,9 +184,7 @@ MappedTarget CurrentScene::target_of(const std::string& name) const {
               .index = index,
               .parameter = index,
               .model = loaded_->serial,
-              .low = info.minimum,
-              .high = info.maximum,
-              .exponential = is_wide(info.minimum, info.maximum)};
+              .range = {info.minimum, info.maximum, is_wide(info.minimum, info.maximum)}};
     }
   }
   for (const CustomInfo& info : instrument.custom) {
@@ -231,9 +229,7 @@ void CurrentScene::show_parameter(ControlSource source, int number, const std::s
       target.has_parameter = true;
       target.parameter = static_cast<std::uint16_t>(found - parameters.begin());
       target.model = loaded_->serial;
-      target.low = control.low;
-      target.high = control.high;
-      target.exponential = control.exponential;
+      target.range = {control.low, control.high, control.exponential};
       return;
     }
   }
@@ -350,9 +346,9 @@ Result<std::string> CurrentScene::preset_text(const std::string& model, double e
                                  .number = row.controller,
                                  .target = row.target,
                                  .gesture = Gesture::parameter,
-                                 .low = control.low,
-                                 .high = control.high,
-                                 .exponential = control.exponential});
+                                 .low = control.range.low,
+                                 .high = control.range.high,
+                                 .exponential = control.range.exponential});
     }
   }
   changes.model = model;

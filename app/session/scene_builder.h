@@ -19,13 +19,13 @@
 namespace ressort::session {
 
 struct SessionOptions {
-  CompileOptions compile;              // its rate is the backend's
-  double gain = 1.0;                   // factor on every preset's gain
-  std::optional<ThirdArgument> third;  // overrides every model's own meaning
-  KeyOptions keys;                     // overrides every preset's tuning
+  CompileOptions compile;                           // its rate is the backend's
+  double gain = 1.0;                                // factor on every preset's gain
+  std::optional<ThirdArgument> third;               // overrides every model's own meaning
+  KeyOptions keys;                                  // overrides every preset's tuning
   std::vector<ControllerSetting> controllers = {};  // the user's mapping
-  bool watch = false;                  // reload the playing scene when its files change
-  bool keeps_flights = false;          // records flights and saves them after problems
+  bool watch = false;          // reload the playing scene when its files change
+  bool keeps_flights = false;  // records flights and saves them after problems
   // The clock that measures forms, and the file that keeps the results. Without a clock no form is
   // measured, and without a file no result is kept.
   decltype(Timings::time) time = {};

@@ -374,15 +374,14 @@ std::vector<KnobInfo> find_knobs(const Network& network, const Preset& preset) {
                   .word = model::word_of(named.name),
                   .help = named.help,
                   .controller = named.number,
-                  .low = first.low,
-                  .high = first.high,
-                  .exponential = first.exponential};
+                  .range = {first.low, first.high, first.exponential}};
     if (first.gesture == Gesture::parameter) {
       knob.parameter = static_cast<std::size_t>(find_parameter(network, first.target));
     } else if (first.gesture == Gesture::position) {
       const Input& input =
           network.inputs[static_cast<std::size_t>(find_input(network, first.target))];
-      knob.rest = input.is_force ? 0.0 : knob.position_of(network.masses[input.mass].position);
+      knob.rest =
+          input.is_force ? 0.0 : knob.range.position_of(network.masses[input.mass].position);
     }
     knobs.push_back(std::move(knob));
   }
@@ -402,20 +401,6 @@ std::vector<KnobInfo> find_knobs(const Network& network, const Preset& preset) {
 }
 
 }  // namespace
-
-double KnobInfo::value_at(double position) const {
-  return exponential ? low * std::pow(high / low, position) : low + (high - low) * position;
-}
-
-double KnobInfo::position_of(double value) const {
-  if (low == high) {
-    return 0.0;
-  }
-  const double position = exponential && value * low > 0.0
-                              ? std::log(value / low) / std::log(high / low)
-                              : (value - low) / (high - low);
-  return std::clamp(position, 0.0, 1.0);
-}
 
 Instrument make_instrument(const Network& network, const Preset& preset, const Proof& proof,
                            const TunedKeys& keys, int voices, double gain) {

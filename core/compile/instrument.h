@@ -11,6 +11,7 @@
 #include "core/compile/stability_check.h"
 #include "core/engine/engine.h"
 #include "core/gesture.h"
+#include "core/knob_range.h"
 #include "core/model/network.h"
 #include "core/model/preset/preset.h"
 
@@ -43,15 +44,10 @@ struct KnobInfo {
   std::string help;  // one line; may be empty
   int controller = 0;
   std::optional<std::size_t> parameter;  // nothing: the knob moves inputs only
-  double low = 0.0;                      // value at 0 and at 1
-  double high = 1.0;
-  bool exponential = false;
-  double rest = 0.0;  // position of a knob without a parameter until it moves
+  KnobRange range;                       // of the parameter
+  double rest = 0.0;                     // position of a knob without a parameter until it moves
 
   std::string address() const { return "/control/" + word; }
-  double value_at(double position) const;
-  // Returns the position at which the knob gives this value, limited to 0..1.
-  double position_of(double value) const;
 };
 
 // Masses that can be struck by name: a mass, a place on a macro, or all nodes of a macro, which are

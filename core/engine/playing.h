@@ -110,13 +110,13 @@ struct Playing {
   KeyFrequencies keys_hz = equal_temperament(440.0, 0.0);
   VelocityCurve velocity;
   ChannelMask channels = midi_channels;  // MIDI channels to listen to
-  // Parameter that is added to the amount of a blow for its length.
+  // Parameter that is added to a blow's amount for its length.
   std::optional<std::size_t> hardness;
-  bool mono = false;                     // one voice per channel plays the latest held key
-  bool legato = false;                   // a key pressed while another is held is not struck
-  double glide_s = 0.0;                  // portamento time, linear in cents
-  NoteShare::Part share;                 // the notes that this engine plays, of several engines
-  Pitches pitches;                       // pitches of the lowest mode
+  bool mono = false;      // one voice per channel plays the latest held key
+  bool legato = false;    // a key pressed while another is held is not struck
+  double glide_s = 0.0;   // portamento time, linear in cents
+  NoteShare::Part share;  // the notes that this engine plays, of several engines
+  Pitches pitches;        // pitches of the lowest mode
   // [key] the same at its own parameters, near its pitch; may be empty
   std::vector<Pitches> key_pitches;
   // Factor on the stiffness of a voice that takes one step a sample, at which its lowest mode has

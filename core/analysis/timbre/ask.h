@@ -34,8 +34,8 @@ FiguresAt timbre_model(StruckModel& model, StruckAs how);
 
 struct TimbreSearchOptions {
   int starts = 8;  // The first start is the current parameters, the others are random.
-  std::optional<FiguresAt> exactly;    // Refines and judges the best result, if given.
-  std::uint64_t seed = 1;              // Seed of the random starts.
+  std::optional<FiguresAt> exactly;  // Refines and judges the best result, if given.
+  std::uint64_t seed = 1;            // Seed of the random starts.
   std::function<void(double share)> on_progress =
       {};  // Reports progress from 0 to 1 as starts finish.
   Progress progress = {};

@@ -173,12 +173,12 @@ TEST_CASE("named controls come in the usual order, at the positions of their par
   CHECK(knobs[0].name == "Brightness");
   CHECK(knobs[0].help == "How bright it is");
   CHECK(knobs[0].address() == "/control/brightness");
-  CHECK(knobs[0].position_of(0.1) == Approx(0.5).epsilon(1e-12));  // 0.1 / 0.05 = 0.2 / 0.1
-  CHECK(knobs[0].position_of(0.3) == 1.0);
+  CHECK(knobs[0].range.position_of(0.1) == Approx(0.5).epsilon(1e-12));  // 0.1 / 0.05 = 0.2 / 0.1
+  CHECK(knobs[0].range.position_of(0.3) == 1.0);
   CHECK(knobs[1].controller == 71);
-  CHECK(knobs[1].position_of(0.0025) == Approx(0.75).epsilon(1e-12));
+  CHECK(knobs[1].range.position_of(0.0025) == Approx(0.75).epsilon(1e-12));
   CHECK_FALSE(knobs[2].parameter);
-  CHECK(knobs[2].rest == 0.5);  // the input starts at 0 of -1 to 1
+  CHECK(knobs[2].rest == 0.5);                    // the input starts at 0 of -1 to 1
   CHECK(knobs[3].address() == "/control/motor");  // scales an LFO, and has no other name
 }
 

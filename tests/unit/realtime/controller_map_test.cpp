@@ -70,9 +70,7 @@ MappedTarget parameter(bool exponential = false) {
           .exists = true,
           .has_parameter = true,
           .model = 1,
-          .low = low,
-          .high = high,
-          .exponential = exponential};
+          .range = {low, high, exponential}};
 }
 
 MappedTarget action(std::uint16_t row) {
