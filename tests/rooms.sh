@@ -59,7 +59,7 @@ judge() {
       sees["core/compile"] = "core core/laws core/linear_algebra core/model core/analysis core/kernels " \
                              "core/engine core/compile"
       all = sees["core/compile"]
-      sees["app/realtime"] = "core/controller.h core/engine core/kernels app app/realtime"
+      sees["app/realtime"] = "core/controller.h core/knob_range.h core/engine core/kernels app app/realtime"
       sees["app/devices"] = "core/result.h core/engine core/kernels app app/realtime app/devices"
       sees["app/session"] = all " app app/realtime app/session app/control/registry.h"
       sees["app/control"] = all " app app/realtime app/devices app/session app/control"
@@ -105,7 +105,7 @@ judge() {
         target = what
         if (match(target, /^(core|app)\/[^\/]*\//)) {
           target = substr(target, 1, RLENGTH - 1)
-        } else if (target ~ /^core\/(rooms|result|formula|progress|groups|lanes|curve|sampled_mode|waveguide_places|raised_cosine|gesture|stroke|input_driver|random|noise|lfo|controller)[.]h$/) {
+        } else if (target ~ /^core\/(rooms|result|formula|progress|groups|lanes|curve|sampled_mode|waveguide_places|raised_cosine|gesture|stroke|input_driver|random|noise|lfo|controller|knob_range)[.]h$/) {
           target = "core"
         } else if (target ~ /^app\/[^\/]*$/) {
           target = "app"
