@@ -76,10 +76,12 @@ TEST_CASE("all instruments sound in tune over the keyboard at three rates",
           "Guitar",         "HandBell",          "Harpsichord",      "IPlayTheTriangle",
           "Kalimba",        "LargeTriangleMesh", "MajorBell",        "Marimba",
           "MarimbaTube",    "MusicBox",          "PluckedHarmonics", "PolyTriangle",
-          "Resonator",      "SixStructures",     "SteelDrum",        "Timpani",
-          "TubularBells",   "Vibraphone",        "Xylophone"}) {
+          "Resonator",      "SixStructures",     "SteelDrum",        "TubularBells",
+          "Vibraphone",     "Xylophone"}) {
       check_keys(name, rate_hz, {36, 45, 57, 69, 81, 93});
     }
+    // The sticks' noise lasts as long as the tone of keys that no kettledrum has.
+    check_keys("Timpani", rate_hz, {36, 45, 57, 69});
   }
 }
 
