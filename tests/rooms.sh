@@ -55,11 +55,11 @@ judge() {
       sees["core/kernels"] = "core/rooms.h core/lanes.h core/groups.h core/sampled_mode.h core/waveguide_places.h core/formula.h core/progress.h core/model/preset/budget.h " \
                              "core/laws core/linear_algebra core/kernels"
       sees["core/engine"] = "core/rooms.h core/lanes.h core/curve.h core/formula.h core/progress.h core/gesture.h core/stroke.h " \
-                            "core/input_driver.h core/random.h core/noise.h core/lfo.h core/laws core/kernels core/engine"
+                            "core/input_driver.h core/random.h core/noise.h core/lfo.h core/midi_number.h core/laws core/kernels core/engine"
       sees["core/compile"] = "core core/laws core/linear_algebra core/model core/analysis core/kernels " \
                              "core/engine core/compile"
       all = sees["core/compile"]
-      sees["app/realtime"] = "core/controller.h core/knob_range.h core/engine core/kernels app app/realtime"
+      sees["app/realtime"] = "core/controller.h core/knob_range.h core/midi_number.h core/engine core/kernels app app/realtime"
       sees["app/devices"] = "core/result.h core/engine core/kernels app app/realtime app/devices"
       sees["app/session"] = all " app app/realtime app/session app/control/registry.h"
       sees["app/control"] = all " app app/realtime app/devices app/session app/control"
@@ -105,7 +105,7 @@ judge() {
         target = what
         if (match(target, /^(core|app)\/[^\/]*\//)) {
           target = substr(target, 1, RLENGTH - 1)
-        } else if (target ~ /^core\/(rooms|result|formula|progress|groups|lanes|curve|sampled_mode|waveguide_places|raised_cosine|gesture|stroke|input_driver|random|noise|lfo|controller|knob_range)[.]h$/) {
+        } else if (target ~ /^core\/(rooms|result|formula|progress|groups|lanes|curve|sampled_mode|waveguide_places|raised_cosine|gesture|stroke|input_driver|random|noise|lfo|controller|knob_range|midi_number)[.]h$/) {
           target = "core"
         } else if (target ~ /^app\/[^\/]*$/) {
           target = "app"

@@ -11,6 +11,7 @@
 #include <deque>
 #include <mutex>
 #include <set>
+#include <system_error>
 #include <thread>
 
 #include "app/control/osc/packet.h"
@@ -123,13 +124,18 @@ class Connections : public httplib::TaskQueue {
     constexpr std::size_t most = 512;
     std::unique_lock lock(mutex_);
     ended_.wait(lock, [&] { return open_ < most; });
-    ++open_;
-    std::thread([this, serve = std::move(serve)] {
+    try {
+      std::thread([this, serve] {
+        serve();
+        const std::lock_guard end(mutex_);
+        --open_;
+        ended_.notify_all();
+      }).detach();
+      ++open_;
+    } catch (const std::system_error&) {  // The system has no more threads: others wait.
+      lock.unlock();
       serve();
-      const std::lock_guard end(mutex_);
-      --open_;
-      ended_.notify_all();
-    }).detach();
+    }
   }
 
   void shutdown() override {

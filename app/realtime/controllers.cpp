@@ -4,20 +4,12 @@
 #include <cmath>
 
 #include "core/engine/midi/channels.h"
+#include "core/midi_number.h"
 
 namespace ressort::realtime {
 namespace {
 
-// Controller numbers of MIDI 1.0.
-constexpr int data_entry = 6;
-constexpr int first_low_half = 32;  // of controller 0
-constexpr int data_entry_fine = 38;
-constexpr int data_increment = 96;
-constexpr int data_decrement = 97;
-constexpr int unregistered_fine = 98;
-constexpr int unregistered_coarse = 99;
-constexpr int registered_fine = 100;
-constexpr int registered_coarse = 101;
+using enum MidiNumber::Controller;
 
 constexpr double steps_of_range = 127.0;  // of an encoder
 
@@ -253,7 +245,7 @@ void ControllerMapper::add_messages(const ControllerInput& input, int number) {
     add(unregistered_coarse, input.number >> 7);
     add(unregistered_fine, input.number);
   }
-  const int controller = is_nrpn ? data_entry : input.number;
+  const int controller = is_nrpn ? int{data_entry} : int{input.number};
   add(controller, input.has_14_bits ? number >> 7 : number);
   if (input.has_14_bits) {
     add(controller + first_low_half, number);

@@ -22,14 +22,19 @@ Result<Done> Song::change(bool is_jump, const std::function<void(State&)>& what)
   if (length_s_ < 0.0) {
     return Error{"no MIDI file was given; 'ressort play MODEL --midi FILE' plays one"};
   }
+  begin_change();
+  what(state_);
+  state_.jumps += is_jump ? 1 : 0;
+  return Done{};
+}
+
+// Holds the position at this moment, and wakes the player once the lock is released.
+void Song::begin_change() {
   const auto now = Clock::now();
   state_.at_s = std::min(state_.position_s(now), length_s_);
   state_.at = now;
-  what(state_);
-  state_.jumps += is_jump ? 1 : 0;
   ++state_.changes;
   wake_.notify_all();
-  return Done{};
 }
 
 Result<Done> Song::play(std::optional<double> from_s) {
@@ -63,18 +68,14 @@ Result<Done> Song::follow_clock() {
 }
 
 void Song::clock(double beats_per_minute) {
-  {
-    const std::lock_guard lock(mutex_);
-    const double tempo = beats_per_minute / beats_per_minute_;
-    constexpr double least_change = 1e-4;
-    if (!follows_clock_ || tempo < least_tempo || tempo > most_tempo ||
-        std::fabs(tempo - state_.tempo) < least_change * state_.tempo) {
-      return;
-    }
+  constexpr double least_change = 1e-4;
+  const std::lock_guard lock(mutex_);
+  const double tempo = beats_per_minute / beats_per_minute_;
+  if (follows_clock_ && tempo >= least_tempo && tempo <= most_tempo &&
+      std::fabs(tempo - state_.tempo) > least_change * state_.tempo) {
+    begin_change();
+    state_.tempo = tempo;
   }
-  static_cast<void>(change(false, [&](State& state) {
-    state.tempo = follows_clock_ ? beats_per_minute / beats_per_minute_ : state.tempo;
-  }));
 }
 
 Result<Done> Song::loop(double from_s, double to_s) {

@@ -60,6 +60,7 @@ class Song {
   void wake();                       // Ends all waiting.
 
  private:
+  void begin_change();  // The caller holds the lock.
   Result<Done> change(bool is_jump, const std::function<void(State&)>& what);
 
   mutable std::mutex mutex_;  // guards all below

@@ -22,6 +22,7 @@
 #include "core/engine/takeover.h"
 #include "core/engine/variation.h"
 #include "core/engine/viewer.h"
+#include "core/midi_number.h"
 
 namespace ressort::engine {
 namespace {
@@ -34,13 +35,7 @@ Playing completed(Playing playing, const Machine& machine) {
   return playing;
 }
 
-// Controller numbers of MIDI 1.0 that the player handles itself.
-constexpr int all_sound_off = 120;
-constexpr int reset_all_controllers = 121;
-constexpr int sustain_pedal = 64;
-constexpr int all_notes_off = 123;  // implied by the channel modes from here on
-constexpr int mono_on = 126;
-constexpr int poly_on = 127;
+using enum MidiNumber::Controller;
 
 bool is_for_a_channel(EventKind kind) {
   return kind == EventKind::note_on || kind == EventKind::note_off ||

@@ -10,6 +10,7 @@
 
 #include "app/session/files.h"
 #include "app/text.h"
+#include "core/midi_number.h"
 
 namespace ressort::commands {
 namespace {
@@ -384,10 +385,8 @@ Result<MidiFile> parse_midi_file(Bytes file) {
 }
 
 void release_all(MidiFile& midi) {
-  constexpr std::array<std::uint8_t, 2> pedals = {64, 66};  // sustain, sostenuto
-  constexpr std::uint8_t first_mode_message = 120;          // 120, 123 and above release all keys
-  constexpr std::uint8_t reset_controllers = 121;           // also lifts the pedals
-  constexpr std::uint8_t local_control = 122;
+  using enum MidiNumber::Controller;
+  constexpr std::array<std::uint8_t, 2> pedals = {sustain_pedal, sostenuto_pedal};
   struct Channel {
     std::bitset<128> keys;
     std::bitset<pedals.size()> pressed;
@@ -412,9 +411,9 @@ void release_all(MidiFile& midi) {
         for (std::size_t i = 0; i < pedals.size(); ++i) {
           channel.pressed[i] = number == pedals[i] ? bytes[2] > 0 : channel.pressed[i];
         }
-        if (number == reset_controllers) {
+        if (number == reset_all_controllers) {
           channel.pressed.reset();
-        } else if (number >= first_mode_message && number != local_control) {
+        } else if (number >= all_sound_off && number != local_control) {
           channel.keys.reset();
         }
         break;

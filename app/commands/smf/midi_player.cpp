@@ -1,10 +1,14 @@
 #include "app/commands/smf/midi_player.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <map>
+#include <optional>
 #include <set>
 #include <utility>
+
+#include "core/midi_number.h"
 
 namespace ressort::commands {
 namespace {
@@ -13,11 +17,10 @@ constexpr std::uint8_t controller = 0xb0;
 
 // Returns what a message sets, such as a controller of a channel, or nothing for a key.
 std::optional<std::pair<int, int>> what_it_sets(std::span<const std::uint8_t> bytes) {
-  constexpr std::uint8_t first_mode_message = 120;
   const int kind = bytes[0] & 0xf0;
   const bool is_controller = kind == controller && bytes.size() > 1;
   const bool sets = kind == 0xc0 || kind == 0xd0 || kind == 0xe0 ||
-                    (is_controller && bytes[1] < first_mode_message);
+                    (is_controller && bytes[1] < MidiNumber::all_sound_off);
   return sets ? std::optional(std::pair<int, int>(bytes[0], is_controller ? bytes[1] : 0))
               : std::nullopt;
 }
@@ -43,9 +46,7 @@ void MidiPlayer::send(std::span<const std::uint8_t> bytes, Song::Clock::time_poi
 
 // Releases the keys and pedals of all channels that the file uses.
 void MidiPlayer::release_keys(Song::Clock::time_point time) {
-  constexpr std::uint8_t sustain = 64;
-  constexpr std::uint8_t sostenuto = 66;
-  constexpr std::uint8_t all_notes_off = 123;
+  using enum MidiNumber::Controller;
   std::set<std::uint8_t> channels;
   for (const MidiFile::Message& message : file_.messages) {
     const std::uint8_t status = file_.bytes_of(message)[0];
@@ -54,8 +55,9 @@ void MidiPlayer::release_keys(Song::Clock::time_point time) {
     }
   }
   for (const std::uint8_t channel : channels) {
-    for (const std::uint8_t number : {sustain, sostenuto, all_notes_off}) {
-      send(std::array<std::uint8_t, 3>{static_cast<std::uint8_t>(controller | channel), number, 0},
+    for (const int number : {sustain_pedal, sostenuto_pedal, all_notes_off}) {
+      send(std::array<std::uint8_t, 3>{static_cast<std::uint8_t>(controller | channel),
+                                       static_cast<std::uint8_t>(number), 0},
            time);
     }
   }

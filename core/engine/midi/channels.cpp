@@ -4,29 +4,12 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/midi_number.h"
+
 namespace ressort::engine {
 namespace {
 
-// Controller numbers of MIDI 1.0.
-enum Number : int {
-  portamento_time = 5,
-  data_entry = 6,
-  volume = 7,
-  pan = 10,
-  expression = 11,
-  data_entry_fine = 38,
-  sustain_pedal = 64,
-  portamento_switch = 65,
-  sostenuto_pedal = 66,
-  soft_pedal = 67,
-  legato_switch = 68,
-  data_increment = 96,
-  data_decrement = 97,
-  unregistered_fine = 98,
-  unregistered_coarse = 99,
-  registered_fine = 100,
-  registered_coarse = 101,
-};
+using enum MidiNumber::Controller;
 
 // Registered parameter numbers (RPN).
 enum Parameter : int {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 
+#include "core/midi_number.h"
 #include "core/model/preset/toml_table.h"
 
 namespace ressort::model {
@@ -189,8 +190,7 @@ bool is_action(std::string_view target) {
 }
 
 int controller_number(std::string_view target) {
-  constexpr int sustain_pedal = 64;
-  return target == "sustain" ? sustain_pedal : number_after("cc", target, 119);
+  return target == "sustain" ? MidiNumber::sustain_pedal : number_after("cc", target, 119);
 }
 
 std::string name_of(const ControllerInput& input) {
@@ -210,10 +210,6 @@ std::span<const PresetKey> controller_keys() {
 
 ParsedControllers parse_controllers(std::string_view text) {
   ParsedControllers read;
-  if (text.size() > max_preset_bytes) {
-    read.errors.push_back({"the mapping is longer than 64 KiB", 1, 1});
-    return read;
-  }
   const auto parsed = parse_toml(text);
   if (!parsed) {
     read.errors.push_back(parsed.error());

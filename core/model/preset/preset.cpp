@@ -925,10 +925,6 @@ std::string curve_text(const Preset& preset, std::string_view parameter) {
 
 ParsedPreset parse_preset(std::string_view text, IsReserved is_reserved) {
   ParsedPreset read;
-  if (text.size() > max_preset_bytes) {
-    read.errors.push_back({"the preset is longer than 64 KiB", 1, 1});
-    return read;
-  }
   const auto parsed = parse_toml(text);
   if (!parsed) {
     read.errors.push_back(parsed.error());

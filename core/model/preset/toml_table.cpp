@@ -84,6 +84,9 @@ std::optional<Error> too_deep(std::string_view toml) {
 }  // namespace
 
 Result<toml::table> parse_toml(std::string_view text) {
+  if (text.size() > max_preset_bytes) {
+    return Error{"the file is longer than 64 KiB", 1, 1};
+  }
   if (auto error = too_deep(text)) {
     return *std::move(error);
   }

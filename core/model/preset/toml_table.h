@@ -133,7 +133,8 @@ class TomlTable {
   std::vector<Error>& errors_;
 };
 
-// Parses TOML that is nested at most 8 levels deep, or returns the error with its place. O(n)
+// Parses TOML of at most max_preset_bytes that is nested at most 8 levels deep, or returns the
+// error with its place. O(n)
 Result<toml::table> parse_toml(std::string_view text);
 
 }  // namespace ressort::model

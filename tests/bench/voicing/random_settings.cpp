@@ -22,7 +22,7 @@ constexpr double long_lift_s = 2.2;
 constexpr double pedals_up_s = 0.2;  // after the key
 constexpr double after_s = 2.0;
 constexpr double undamped_after_s = 16.0;  // for presets without damper, which must ring out
-constexpr double body_after_s = 4.0;       // for a body, which no damper touches
+constexpr double body_after_s = 2.0;       // for a body, which no damper touches
 
 constexpr double loudest_db = 0.0;
 constexpr double softest_db = -40.0;

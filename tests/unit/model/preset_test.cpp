@@ -505,7 +505,7 @@ TEST_CASE("invalid TOML is reported with its position", "[preset]") {
     CHECK(preset.errors[0].column >= 1);
     CHECK_FALSE(preset.errors[0].message.empty());
   }
-  check_error({std::string(max_preset_bytes + 1, ' '), 1, 1, "the preset is longer than 64 KiB"});
+  check_error({std::string(max_preset_bytes + 1, ' '), 1, 1, "the file is longer than 64 KiB"});
   const auto second = parse_preset("model = \"x\"\nvoices = = 3");
   REQUIRE(second.errors.size() == 1);
   CHECK(second.errors[0].line == 2);
