@@ -1,16 +1,21 @@
-// A libFuzzer target: any text is read as a preset or rejected with a position and a message. A
-// preset that is read is applied to a model with all elements, and played.
+// A libFuzzer target: any text is read as a preset and as a mapping of controllers, or rejected
+// with a position and a message. A preset that is read is applied to a model with all elements, and
+// played.
 #include "core/model/preset/preset.h"
 
 #include "app/control/registry.h"
+#include "core/model/preset/controllers.h"
 #include "tests/fuzz/player.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace ressort;
   using fuzz::require;
   const ParsedPreset parsed = parse_preset(fuzz::text_of(data, size), is_reserved);
-  for (const Error& error : parsed.errors) {
-    require(!error.message.empty() && error.line >= 1 && error.column >= 1);
+  const ParsedControllers mapping = parse_controllers(fuzz::text_of(data, size));
+  for (const std::vector<Error>* errors : {&parsed.errors, &mapping.errors}) {
+    for (const Error& error : *errors) {
+      require(!error.message.empty() && error.line >= 1 && error.column >= 1);
+    }
   }
   if (!parsed.ok()) {
     return 0;

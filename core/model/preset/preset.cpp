@@ -281,7 +281,6 @@ Gesture usual_gesture(std::string_view target) {
              : Gesture::parameter;
 }
 
-// Reads "round_robin = [1, 2]".
 // Reads the name and the help of a controller. All controls of one controller are one knob, which
 // has one name.
 void read_name(const toml::table& table, TomlTable& reader, const Preset& preset,
@@ -330,6 +329,7 @@ void read_name(const toml::table& table, TomlTable& reader, const Preset& preset
   }
 }
 
+// Reads "round_robin = [1, 2]".
 void read_round_robin(TomlTable& reader, ControlSetting& control) {
   constexpr double most_turns = 16.0;
   double turn = control.turn;
