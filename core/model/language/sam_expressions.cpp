@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "core/model/language/expression.h"
@@ -31,11 +32,13 @@ constexpr NumberFunction number_functions[] = {
     {"db2linear", 1, "pow(10,(", ")/20)"},
     {"mtof", 1, "440*pow(2,((", ")-69)/12)"},
     {"simpleStringTermDelay", 1, "0.5/(", ")"},
+    {"tau2pole", 1, "exp(-1/44100/(", "))"},
 };
 constexpr std::string_view slider_words[] = {"hslider", "vslider", "nentry"};
-// Filters that leave a constant as it is. Parameters that set levels move smoothly by themselves.
-constexpr std::string_view smoothers[] = {"smooth",  "smoo",      "onePoleBLT",
-                                          "lowpass", "lowpass3e", "lowpass6e"};
+// Filters that are left out and leave a constant as it is. Parameters that set levels move smoothly
+// by themselves.
+constexpr std::string_view smoothers[] = {"onePoleBLT", "lowpass3e", "lowpass6e"};
+constexpr double highest_order = 6.0;
 constexpr std::string_view sample_rate = "44100";
 
 template <class List, class Item>
@@ -100,10 +103,10 @@ void SamLines::define_parameters() {
 }
 
 std::string SamLines::expression(const Origin& line, const Token& token) {
-  const Listen* const listen = std::exchange(listen_, nullptr);
+  const SamSources* const sources = std::exchange(sources_, nullptr);
   Cursor at{.line = &line, .rest = trimmed(token), .name = "slider"};
   const Value value = chain(at);
-  listen_ = listen;
+  sources_ = sources;
   if (!value) {
     return "0";
   }
@@ -117,11 +120,11 @@ std::string SamLines::expression(const Origin& line, const Token& token) {
 }
 
 std::optional<SamSignal> SamLines::signal(const Origin& line, const Token& token,
-                                          std::string_view name, const Listen& listen) {
-  listen_ = &listen;
+                                          std::string_view name, const SamSources& sources) {
+  sources_ = &sources;
   Cursor at{.line = &line, .rest = trimmed(token), .name = name};
   const Value value = chain(at);
-  listen_ = nullptr;
+  sources_ = nullptr;
   if (!value) {
     return std::nullopt;
   }
@@ -412,15 +415,26 @@ SamLines::Value SamLines::call(Cursor& at, const Token& name, std::vector<SamSig
     return number_signal(tidy(*at.line, name, text + std::string(function->behind)));
   }
   if (at.input != nullptr) {  // a filter or another effect
+    const std::vector<SamFilter> chain = filters(at, name, arguments);
+    std::optional<SamSignal> signal = at.input->front();
+    for (const SamFilter& filter : chain) {
+      signal = signal ? filtered(at, name, *signal, filter) : signal;
+    }
+    if (!chain.empty() && signal) {
+      return SamSignals{std::move(*signal)};
+    }
     if (!is_single_number(*at.input) || !is_in(smoothers, name.text)) {
       if (left_out_.insert(std::string(name.text)).second) {
-        warning(*at.line, name, "left out: " + quoted(name.text) + " is not supported");
+        warning(*at.line, name,
+                "left out: " + quoted(name.text) +
+                    (chain.empty() ? " is not supported"
+                                   : " follows positions only, and at most three in a row"));
       }
     }
     return *at.input;
   }
-  if (listen_ != nullptr && arguments.empty()) {
-    const auto heard = (*listen_)(*at.line, name);
+  if (sources_ != nullptr && arguments.empty()) {
+    const auto heard = sources_->heard(name);
     return heard ? Value(SamSignals{*heard}) : std::nullopt;
   }
   error(*at.line, name,
@@ -429,6 +443,83 @@ SamLines::Value SamLines::call(Cursor& at, const Token& name, std::vector<SamSig
             "supported" +
             suggestion(name.text, parameters));
   return std::nullopt;
+}
+
+// Returns the sections of a filter of FAUST's libraries, or none for other functions. lowpass and
+// highpass are Butterworth filters by the bilinear transform.
+std::vector<SamFilter> SamLines::filters(const Cursor& at, const Token& name,
+                                         const std::vector<SamSignals>& arguments) {
+  const bool is_pass = name.text == "lowpass" || name.text == "highpass";
+  const std::size_t count = is_pass ? 2 : name.text == "smooth" ? 1 : 0;
+  if ((count == 0 && name.text != "smoo" && name.text != "dcblocker") || at.input->size() != 1 ||
+      arguments.size() != count ||
+      !std::all_of(arguments.begin(), arguments.end(),
+                   [](const SamSignals& value) { return is_single_number(value); })) {
+    return {};
+  }
+  const auto is = [&](const std::string& text) { return tidy(*at.line, name, text); };
+  if (!is_pass) {
+    if (name.text == "dcblocker") {
+      return {{.stiffness = "0.005", .direct = "1", .gain = "0"}};
+    }
+    const std::string share = count == 1 ? is("1-(" + arguments[0][0].number + ")") : "0.001";
+    return {{.stiffness = share, .direct = share}};
+  }
+  double order = 0.0;
+  const std::string& hz = arguments[1][0].number;
+  if (!parse_number(arguments[0][0].number, order) || order != std::floor(order) || order < 1.0 ||
+      order > highest_order || !(value(hz) > 0.0 && value(hz) < 22050.0)) {
+    return {};
+  }
+  const bool is_high = name.text == "highpass";
+  const std::string angle = "(clamp(" + hz + ",0.01,22049)*3.141592653589793/44100)";
+  const std::string c = "(" + is("cos" + angle + "/sin" + angle) + ")";
+  const int n = static_cast<int>(order);
+  std::vector<SamFilter> sections;
+  for (int i = n; i > 0; i -= 2) {
+    const bool is_single = i == 1;
+    const std::string a =
+        print_number(2.0 * std::cos(std::numbers::pi * (i - 1) / (2.0 * n))) + "*";
+    const std::string top = !is_high ? "1" : is_single ? c : c + "*" + c;
+    const std::string sum = "(1+" + (is_single ? c : a + c + "+" + c + "*" + c) + ")";
+    sections.push_back({.stiffness = is((is_single ? "2/" : "4/") + sum),
+                        .damping = is_single ? "1" : is("2*" + a + c + "/" + sum),
+                        .direct = is(top + "/" + sum),
+                        .gain = is_high ? "0" : "1",
+                        .lead = is_single ? "0" : is(top + "*" + a + c + "/2/" + sum)});
+  }
+  return sections;
+}
+
+// Returns a signal behind a filter. A constant is as after a long time.
+std::optional<SamSignal> SamLines::filtered(const Cursor& at, const Token& name,
+                                            const SamSignal& input, const SamFilter& filter) {
+  const auto times = [&](const std::string& a, const std::string& b) {
+    return b == "1" ? a : a == "1" ? b : join(*at.line, name, a, '*', b);
+  };
+  SamSignal result{.parts = {}, .number = times(input.number, filter.gain)};
+  const std::string slow = join(*at.line, name, filter.gain, '-', filter.direct);
+  for (SamSignal::Part part : input.parts) {
+    if (part.is_force || (part.derivative == 2 && filter.lead != "0")) {
+      return std::nullopt;
+    }
+    const SamElement* const follower = sources_->follower(*part.element, filter);
+    if (follower == nullptr) {
+      return std::nullopt;
+    }
+    const std::string level = part.level;
+    part.level = times(level, filter.direct);
+    result.parts.push_back(part);
+    part.element = follower;
+    part.level = times(level, slow);
+    result.parts.push_back(part);
+    if (filter.lead != "0") {
+      ++part.derivative;
+      part.level = join(*at.line, name, "0", '-', times(level, filter.lead));
+      result.parts.push_back(part);
+    }
+  }
+  return result;
 }
 
 // Evaluates hslider("label", start, least, most, step), vslider or nentry: a parameter that is

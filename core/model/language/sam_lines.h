@@ -25,11 +25,13 @@ struct Statement {
   std::vector<Token> names;
 };
 
+struct SamElement;
+
 // A FAUST signal without delays: a sum of elements, each times an expression in the .mdl language,
 // and a constant.
 struct SamSignal {
   struct Part {
-    std::size_t element = 0;
+    const SamElement* element = nullptr;
     int derivative = 0;     // of the position: 1 is the velocity, 2 the acceleration, per sample
     bool is_force = false;  // the force on the element
     std::string level;
@@ -40,6 +42,25 @@ struct SamSignal {
   bool is_number() const { return parts.empty(); }
 };
 using SamSignals = std::vector<SamSignal>;  // parallel signals
+
+// A filter of order 1 or 2 as a mass that follows a position s: with mass 1, it has a spring to s
+// and a damper to the ground. With its position y and velocity v per sample, the output is direct s
+// + (gain - direct) y - lead v.
+struct SamFilter {
+  std::string stiffness;
+  std::string damping = "1";
+  std::string direct;
+  std::string gain = "1";  // at 0 Hz
+  std::string lead = "0";
+};
+
+// Elements that an output refers to.
+struct SamSources {
+  // Returns the signal of an element, or nothing after reporting an error.
+  std::function<std::optional<SamSignal>(const Token& name)> heard;
+  // Returns the mass that follows an element, or null if none can.
+  std::function<const SamElement*(const SamElement& source, const SamFilter& filter)> follower;
+};
 
 // `faustcode: name(arguments) = expression;`
 struct SamDefinition {
@@ -68,16 +89,13 @@ Token trimmed(Token token);
 // Parses the lines of a text, stores their definitions and evaluates FAUST expressions.
 class SamLines {
  public:
-  // Returns the signal of an element, or nothing after reporting an error.
-  using Listen = std::function<std::optional<SamSignal>(const Origin& line, const Token& name)>;
-
   void read(std::string_view text, const Progress& progress);
 
   // Translates an expression of parameters and numbers. Returns "0" after reporting an error.
   std::string expression(const Origin& line, const Token& token);
-  // Evaluates the signal of an output named `name`, whose elements `listen` returns.
+  // Evaluates the signal of an output named `name`.
   std::optional<SamSignal> signal(const Origin& line, const Token& token, std::string_view name,
-                                  const Listen& listen);
+                                  const SamSources& sources);
   // Joins two expressions by + - * / or ^. Returns a number if the result is too long.
   std::string join(const Origin& line, const Token& token, const std::string& a, char op,
                    const std::string& b);
@@ -116,6 +134,10 @@ class SamLines {
   Value word(Cursor& at);
   Value call(Cursor& at, const Token& name, std::vector<SamSignals> arguments);
   std::optional<std::vector<SamSignals>> arguments_of(Cursor& at);
+  std::vector<SamFilter> filters(const Cursor& at, const Token& name,
+                                 const std::vector<SamSignals>& arguments);
+  std::optional<SamSignal> filtered(const Cursor& at, const Token& name, const SamSignal& input,
+                                    const SamFilter& filter);
   Value slider(Cursor& at, const Token& word);
   Value defined(Cursor& at, const Token& name, std::vector<SamSignals> arguments);
   Value table(Cursor& at, const Token& name);
@@ -132,7 +154,7 @@ class SamLines {
   std::map<std::string, SamDefinition, std::less<>> lines_;  // definitions by name
   std::vector<std::string> order_;                           // names, in order of their lines
   std::map<std::pair<int, int>, std::string> sliders_;       // parameters by line and column
-  const Listen* listen_ = nullptr;
+  const SamSources* sources_ = nullptr;
   std::set<std::string, std::less<>> left_out_;  // functions that have caused a warning
   std::size_t spent_ = 0;                        // total bytes of expressions
   DiagnosticCount count_;

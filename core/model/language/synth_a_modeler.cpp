@@ -1,6 +1,7 @@
 #include "core/model/language/synth_a_modeler.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -10,7 +11,6 @@
 #include "core/model/language/sam_lines.h"
 
 namespace ressort::model {
-namespace {
 
 enum class SamKind {
   mass,
@@ -35,17 +35,20 @@ struct SamShape {
   std::string_view form;
 };
 
-bool is_link(SamKind kind) {
-  return kind == SamKind::link || kind == SamKind::touch || kind == SamKind::pluck;
-}
-
 struct SamElement {
   const Statement* statement = nullptr;
   const SamShape* shape = nullptr;
   std::string end;                  // reference for the end of a link; empty if no link may attach
   std::string force;                // constant force towards -x; masses only
+  int filters = 0;                  // between an element and this mass of a filter
   std::vector<std::size_t> guides;  // waveguides that end here; terminations and junctions only
 };
+
+namespace {
+
+bool is_link(SamKind kind) {
+  return kind == SamKind::link || kind == SamKind::touch || kind == SamKind::pluck;
+}
 
 // Translates one text.
 class SamTranslator {
@@ -78,6 +81,8 @@ class SamTranslator {
   void write_output(const SamElement& element);
   std::optional<SamSignal> heard(const SamElement& out, const Token& name);
   std::optional<SamSignal> force_of(const SamElement& link);
+  const SamElement* follower(const SamElement& out, const SamElement& source,
+                             const SamFilter& filter);
   std::string hand_at(const SamElement& pluck, std::size_t side);
   std::string unique(std::string label) const;
 
@@ -114,6 +119,8 @@ class SamTranslator {
   SamLines lines_;
   std::vector<SamElement> elements_;
   std::map<std::string_view, std::size_t> by_name_;
+  // Masses of filters, by the end that they follow, stiffness and damping.
+  std::map<std::array<std::string, 3>, SamElement> followers_;
   std::vector<bool> joined_;  // [element] a waveguide that is part of a row
   int ports_ = 0;
   int outputs_ = 0;
@@ -129,6 +136,9 @@ constexpr std::size_t longest_name = 900;  // bytes
 
 // The running mean of a termination has at most 256 samples.
 constexpr double lowest_fc = 44100.0 / 256.0;
+
+// Filters in a row. In single precision, forces on lighter masses would vanish.
+constexpr int most_filters = 3;
 
 // Stiffness of the links that tie waveguides to one junction, in impedances per sample.
 constexpr std::string_view tie_stiffness = "1000";
@@ -731,7 +741,7 @@ std::optional<SamSignal> SamTranslator::heard(const SamElement& out, const Token
   if (is_link(element.shape->kind)) {
     return force_of(element);
   }
-  return SamSignal{.parts = {{.element = found->second, .level = "1"}}};
+  return SamSignal{.parts = {{.element = &element, .level = "1"}}};
 }
 
 // Returns the force of a link. Synth-A-Modeler computes it from the positions one sample before,
@@ -757,7 +767,7 @@ std::optional<SamSignal> SamTranslator::force_of(const SamElement& link) {
         const std::string level =
             (side == 0 ? "" : "-(") + levels[derivative] + (side == 0 ? "" : ")");
         force.parts.push_back(
-            {.element = ends[side],
+            {.element = &elements_[ends[side]],
              .derivative = derivative,
              .level = lines_.tidy(link.statement->origin, link.statement->word, level)});
       }
@@ -777,7 +787,7 @@ std::optional<SamSignal> SamTranslator::force_of(const SamElement& link) {
         });
     if (links == 1 && elements_[ends[side]].guides.empty()) {
       force.parts.push_back(
-          {.element = ends[side], .is_force = true, .level = side == 1 ? "1" : "-1"});
+          {.element = &elements_[ends[side]], .is_force = true, .level = side == 1 ? "1" : "-1"});
       return force;
     }
   }
@@ -787,19 +797,48 @@ std::optional<SamSignal> SamTranslator::force_of(const SamElement& link) {
   return SamSignal{};
 }
 
+// Returns the mass of a filter, or null behind a termination, which does not move. It is so light
+// that it does not load its source: an inertia of 1e-7, and 1e-11 of that of the filter before it.
+const SamElement* SamTranslator::follower(const SamElement& out, const SamElement& source,
+                                          const SamFilter& filter) {
+  if (source.shape->kind == SamKind::termination || source.filters == most_filters) {
+    return nullptr;
+  }
+  const auto [at, is_new] = followers_.try_emplace({source.end, filter.stiffness, filter.damping});
+  SamElement& mass = at->second;
+  if (is_new) {
+    const Origin& origin = out.statement->origin;
+    mass = {.statement = out.statement, .shape = source.shape, .filters = source.filters + 1};
+    if (source.end.empty()) {
+      return &mass;  // join_row reports it
+    }
+    mass.end = unique("@filter" + std::to_string(followers_.size()));
+    const std::string inertia = print_number(std::pow(10.0, 4 - 11 * mass.filters));
+    const auto scaled_by_inertia = [&](const std::string& factor) {
+      return lines_.join(origin, out.statement->word, inertia, '*', factor);
+    };
+    emit(origin, mass.end + " osc " + inertia + " 0 " + scaled_by_inertia(filter.damping) + " 0 0");
+    emit(origin, mass.end + "_link spring " + mass.end + " " + source.end + " " +
+                     scaled_by_inertia(filter.stiffness));
+  }
+  return &mass;
+}
+
 void SamTranslator::write_output(const SamElement& element) {
   const Statement& statement = *element.statement;
   const Token& text = statement.arguments[0];
-  const auto signal =
-      lines_.signal(statement.origin, text, statement.names[0].text,
-                    [&](const Origin&, const Token& name) { return heard(element, name); });
+  const auto signal = lines_.signal(
+      statement.origin, text, statement.names[0].text,
+      {.heard = [&](const Token& name) { return heard(element, name); },
+       .follower = [&](const SamElement& source,
+                       const SamFilter& filter) { return follower(element, source, filter); }});
   if (!signal) {
     return;
   }
   const std::string channel = "@out" + std::to_string(++outputs_);
   bool has_termination = false;
   for (const SamSignal::Part& part : signal->parts) {
-    const SamElement& source = elements_[part.element];
+    const SamElement& source = *part.element;
     has_termination = has_termination || source.shape->kind == SamKind::termination;
     if (!source.end.empty() && part.level != "0") {  // otherwise join_row has reported it
       constexpr const char* words[] = {" posOutput ", " velOutput ", " accOutput "};

@@ -166,6 +166,82 @@ TEST_CASE("what is left out of an output causes one warning", "[sam_expressions]
   CHECK(warnings[0] == "1:17: left out: 'reverb' is not supported");
 }
 
+// FAUST's filters, as their recursions: smooth and dcblocker as they are written there, lowpass and
+// highpass by the bilinear transform of 1/(1+s) and of 1/(1+a s+s^2), or of s and s^2 above these.
+TEST_CASE("filters behind an output agree with FAUST's recursions", "[sam_expressions]") {
+  using Row = std::vector<double>;
+  const auto run = [](const Row& x, double b0, double b1, double b2, double a1, double a2) {
+    Row y;
+    for (std::size_t n = 0; n < x.size(); ++n) {
+      const auto before = [n](const Row& of, std::size_t d) { return n < d ? 0.0 : of[n - d]; };
+      y.push_back(b0 * x[n] + b1 * before(x, 1) + b2 * before(x, 2) - a1 * before(y, 1) -
+                  a2 * before(y, 2));
+    }
+    return y;
+  };
+  const auto first = [&](const Row& x, double hz, double s) {
+    const double c = 1.0 / std::tan(std::numbers::pi * hz / fs);
+    return run(x, (1.0 - s + s * c) / (1.0 + c), (1.0 - s - s * c) / (1.0 + c), 0.0,
+               (1.0 - c) / (1.0 + c), 0.0);
+  };
+  const auto second = [&](const Row& x, double hz, double s, double a) {
+    const double c = 1.0 / std::tan(std::numbers::pi * hz / fs);
+    const double d = 1.0 + a * c + c * c;
+    const double top = (s == 0.0 ? 1.0 : c * c) / d;
+    return run(x, top, (s == 0.0 ? 2.0 : -2.0) * top, top, 2.0 * (1.0 - c * c) / d,
+               (1.0 - a * c + c * c) / d);
+  };
+  const std::string text =
+      "faustcode: low=highpass(4,20.0);\n"
+      "faustcode: cut=hslider(\"Cut\",900.0,100.0,5000.0,1.0);\n" +
+      drum + "mass(0.002,0.0,-0.7),tail;\nlink(900.0,0.02,0.0),l,tail,rim;\n";
+  const std::string moving = "mass(0.003,0.0,1.0),bell;\nlink(2000.0,0.01,0.0),b,bell,head;\n";
+  const Row plain = rendered(text + moving + "audioout,a,bell*(2.0)-tail;\n", 8000)[0];
+  const double pairs[] = {2.0 * std::cos(std::numbers::pi / 8.0),
+                          2.0 * std::cos(3.0 * std::numbers::pi / 8.0)};
+  const struct {
+    const char* filter;
+    Row expected;
+  } cases[] = {
+      {"smooth(0.99)", run(plain, 0.01, 0.0, 0.0, -0.99, 0.0)},
+      {"si.smoo", run(plain, 0.001, 0.0, 0.0, -0.999, 0.0)},
+      {"smooth(tau2pole(0.01))",
+       run(plain, 1.0 - std::exp(-1.0 / 441.0), 0.0, 0.0, -std::exp(-1.0 / 441.0), 0.0)},
+      {"dcblocker", run(plain, 1.0, -1.0, 0.0, -0.995, 0.0)},
+      {"*(0.5):lowpass(1,cut)*2.0", first(plain, 900.0, 0.0)},
+      {"fi.highpass(1,300.0)", first(plain, 300.0, 1.0)},
+      {"low", second(second(plain, 20.0, 1.0, pairs[0]), 20.0, 1.0, pairs[1])},
+      {"lowpass(2,cut*10.0)", second(plain, 9000.0, 0.0, std::numbers::sqrt2)},
+      {"lowpass(3,cut)", first(second(plain, 900.0, 0.0, 1.0), 900.0, 0.0)},
+      {"highpass(2,100.0):lowpass(1,cut)",
+       first(second(plain, 100.0, 1.0, std::numbers::sqrt2), 900.0, 0.0)},
+  };
+  for (const auto& [filter, expected] : cases) {
+    const Row y =
+        rendered(text + moving + "audioout,a,(bell*(2.0)-tail):" + filter + ";\n", 8000)[0];
+    double worst = 0.0;
+    double most = 0.0;
+    for (std::size_t n = 0; n < y.size(); ++n) {
+      worst = std::max(worst, std::fabs(y[n] - expected[n]));
+      most = std::max(most, std::fabs(expected[n]));
+    }
+    INFO(filter << ": " << worst / most);
+    CHECK(most > 1e-6);
+    CHECK(worst < 1e-9 * most);
+  }
+}
+
+TEST_CASE("a filter that cannot be computed is left out with its reason", "[sam_expressions]") {
+  const std::string fourth = drum + "audioout,a,head:lowpass(1,99.0):lowpass(6,99.0);\n";
+  CHECK(warnings_of(fourth)[0] ==
+        "4:33: left out: 'lowpass' follows positions only, and at most three in a row");
+  for (const char* const filter : {"lowpass(2)", "lowpass(0,99.0)", "highpass(7,99.0)",
+                                   "highpass(1.5,99.0)", "lowpass(1,0.0)", "lowpass(1,22050.0)"}) {
+    INFO(filter);
+    CHECK(warnings_of(drum + "audioout,a,head:" + filter + ";\n")[0].find("4:17: left out") == 0);
+  }
+}
+
 // Strings of one impedance, fixed at one end and tied at the other, resonate where the sum of
 // cot(pi f T) is 0, with T the time from the knot to the fixed end and back.
 TEST_CASE("a junction may join any number of waveguides", "[sam_expressions]") {
@@ -255,6 +331,78 @@ TEST_CASE("models in the style of the published ones are read", "[sam_expression
     }
   }
   CHECK(read == 75);
+}
+
+// The classes of files that are published, each with three values. Masses swing at the frequency of
+// their spring, and strings resonate at 1/T, or at half of it where one end is free to move.
+TEST_CASE("models of each published class sound at their frequency", "[sam_expressions]") {
+  const auto number = [](double value) { return std::to_string(value); };
+  int models = 0;
+  for (const double k : {350.0, 1200.0, 4000.0}) {
+    const double mass_hz =
+        fs / std::numbers::pi * std::asin(0.5 * std::sqrt(k / (0.001 * fs * fs)));
+    const std::string mass = "mass(0.001,0.0,1.0),r;\nground(0.0),g;\n";
+    const std::string link = mass + "link(" + number(k) + ",0.0001,0.0),l,r,g;\n";
+    const std::string hand = "port(),hand;\nport(),device2;\n";
+    const double string_s = std::round(6e5 / k) * 1e-6;  // as it is written
+    const auto string = [&](int junctions) {
+      std::string text = hand + "touch(9.0,0.0,0.0),hit,hand,j;\njunction(0.0),j;\n";
+      for (int i = 0; i < junctions; ++i) {
+        const std::string n = std::to_string(i);
+        text += "waveguide(0.5,simpleString(0.02," + number(string_s) + ")),w" + n + ",t" + n +
+                ",j;\ntermination(memorylessStringTerm(-0.995)),t" + n + ";\n";
+      }
+      return text + "audioout,a0,j;\n";
+    };
+    const double pair = std::sqrt((3.0 + std::sqrt(5.0)) / 2.0);  // two equal masses, one fixed end
+    const struct {
+      const char* style;
+      std::string text;
+      double hz;
+    } cases[] = {
+        {"a filter defined and not used",
+         "faustcode: low=highpass(4,20.0);\n" + link + "audioout,a0,r;\n", mass_hz},
+        {"a filter defined and used",
+         "faustcode: low=highpass(4,20.0);\n" + link + "audioout,a0,r*(30.0):low;\n", mass_hz},
+        {"FAUST behind an output", link + "audioout,a0,r*(100.0):highpass(1,2000.0):*(2.0);\n",
+         mass_hz},
+        {"the force of a link", link + "audioout,a0,l*0.01;\n", mass_hz},
+        {"a port beside a mass", hand + link + "audioout,a0,1.0*(r*(100.0)+hand*0.5);\n", mass_hz},
+        {"a smoothed slider",
+         "faustcode: k=hslider(\"K\"," + number(k) + ",50,9999,1):smooth(0.999);\n" + mass +
+             "link(k,0.0001,0.0),l,r,g;\naudioout,a0,r;\n",
+         mass_hz},
+        {"a constant output", link + "audioout,a1,0.0;\naudioout,a0,r;\n", mass_hz},
+        {"a pluck with an offset",
+         hand + link + "pluck(500.0,0.1,0.002,0.5),p,r,hand;\naudioout,a0,r;\n", mass_hz},
+        {"a pulseTouch",
+         hand + link + "pulseTouch(100.0,0.1,1.0,4.0,0.01,0.006),p,hand,r;\naudioout,a0,r;\n",
+         mass_hz},
+        {"masses in a row",
+         link + "mass(0.001,0.0,-0.618),s;\nlink(" + number(k) +
+             ",0.0001,0.0),m,r,s;\naudioout,a0,r;\n",
+         fs / std::numbers::pi * std::asin(0.5 * pair * std::sqrt(k / (0.001 * fs * fs)))},
+        {"resonators",
+         hand + "resonators(" + number(k) + ",0.05,0.01, " + number(2.7 * k) +
+             ",0.01,9.0),r;\ntouch(9.0,0.0,0.0),hit,hand,r;\naudioout,a0,r;\n",
+         k},
+        {"a junction of one waveguide", string(1), 0.5 / string_s},
+        {"a junction of three waveguides", string(3), 0.5 / string_s},
+        {"a junction of five waveguides", string(5), 0.5 / string_s},
+    };
+    for (const auto& [style, text, hz] : cases) {
+      INFO(style << ", " << hz << " Hz\n" << text);
+      Player player(text, default_preset(network_of(text), true), {.bare = true});
+      std::vector<double> touch(11025, -1.0);
+      std::fill(touch.begin(), touch.begin() + 60, 0.01);
+      const std::vector<const double*> inputs(player.compiled.instrument.inputs.size(),
+                                              touch.data());
+      player.run(touch.size(), {}, {256}, inputs);
+      CHECK(std::fabs(measured_hz(player.out.back(), fs, hz, 0.01) / hz - 1.0) < 2e-3);
+      ++models;
+    }
+  }
+  CHECK(models == 42);
 }
 
 }  // namespace ressort::sam_expressions_test
