@@ -40,6 +40,10 @@ void add_recording(CLI::App& command, BodyOptions& options) {
       ->type_name("DB")
       ->check(within(-200.0, 0.0))
       ->capture_default_str();
+  command
+      .add_option("--listen", options.listen,
+                  "folder for WAV files of the recording, its modes, its noise and their sum")
+      ->type_name("DIR");
   command.add_flag("--json", options.as_json, "print JSON");
 }
 
@@ -136,7 +140,7 @@ void add_body(CLI::App& app, BodyRequest& request, int& code) {
   add_output(*command, request.output, "model to write (default: print)");
   command
       ->add_option("--picture", request.picture,
-                   ".svg of the spectrum of a recording, or of the mode shapes of a solid")
+                   ".svg of a recording and its body, or of the mode shapes of a solid")
       ->type_name("FILE");
   command
       ->add_option(

@@ -19,6 +19,7 @@ constexpr double twin = 0.15;  // Poles closer than this share of their damping 
 // Least squared amplitude over twice its variance; noise reaches this with a probability of e^-21.
 constexpr double chance = 21.0;
 constexpr double deepest_db = -110.0;      // Modes this far below the strongest one are dropped.
+constexpr double least_freedoms = 100.0;   // Of a band that tells the noise level around a mode.
 constexpr std::size_t least_fitted = 150;  // Number of modes that are fitted at once if found.
 // Modes that leave less than this share of the energy are not those of noise.
 constexpr double most_of_noise = 0.8;
@@ -62,6 +63,20 @@ class Noise {
         std::max({8.0 * std::numbers::pi / static_cast<double>(power.frames()), 2.0 * alpha,
                   0.02 * omega, 0.002});
     return power.density(omega, half_width) / static_cast<double>(channels_);
+  }
+  // Returns the same over a band that has many more degrees of freedom than the fit has taken from
+  // it, and corrects for those taken.
+  double variance_beside(Complex log_z, const std::vector<DampedMode>& modes) const {
+    const Power& power = power_of(-log_z.real());
+    const double freedoms = static_cast<double>(power.frames() * channels_) / std::numbers::pi;
+    const double half_width = std::max(least_freedoms / (2.0 * freedoms), 0.1 * log_z.imag());
+    const auto near = std::count_if(modes.begin(), modes.end(), [&](const DampedMode& mode) {
+      return std::fabs(mode.log_z.imag() - log_z.imag()) < half_width;
+    });
+    const double all = 2.0 * half_width * freedoms;
+    const double taken = 2.0 * static_cast<double>(near) * static_cast<double>(1 + channels_);
+    return power.density(log_z.imag(), half_width) / static_cast<double>(channels_) * all /
+           std::max(0.5 * all, all - taken);
   }
   // Returns the same between the peaks of the residual (by the median of the density).
   double floor(Complex log_z) const {
@@ -150,18 +165,49 @@ class Search {
       start.emplace_back(channel.begin(), channel.begin() + static_cast<std::ptrdiff_t>(frames));
     }
     progress_.stage("searching for modes");
-    std::vector<Complex> found = find_poles(start, search, progress_);
+    const std::vector<Complex> found = find_poles(start, search, progress_);
     if (found.empty()) {
       fit_.set_modes(before);
       return;
     }
     progress_.stage("fitting the modes to the sound");
-    add(strongest(std::move(found), start));
+    add(strongest(found, start));
     for (int round = 0; round < 12 && drop_unlikely() > 0; ++round) {
     }
     fit_.refine(2, roughly_settled, progress_);
     if (drop_unlikely() > 0) {
       fit_.refine(2, roughly_settled, progress_);
+    }
+  }
+
+  // Adds strongly damped modes that ESPRIT missed, from a grid of frequencies and Qs: those that
+  // explain the most of the residual. Repeats while the residual falls by a twentieth.
+  void add_damped_modes(double highest_omega) {
+    constexpr int rounds = 6;
+    constexpr double grid_step = 1.03;
+    progress_.stage("searching for damped modes");
+    std::vector<Complex> grid;
+    // From 30 Hz at 44,100 Hz, and four periods in the sound.
+    const double lowest_omega =
+        std::max(0.004, 8.0 * std::numbers::pi / static_cast<double>(frames()));
+    for (double omega = lowest_omega; omega < highest_omega; omega *= grid_step) {
+      for (double quality = 2.5; quality < 50.0; quality *= 2.0) {
+        grid.emplace_back(-0.5 * omega / quality, omega);
+      }
+    }
+    for (int round = 0; round < rounds && fit_.modes().size() < most_; ++round) {
+      const double before = fit_.rest_energy();
+      if (before < rounding * sound_energy_) {
+        return;
+      }
+      add(explaining(grid));
+      drop_unlikely();
+      fit_.refine(4, roughly_settled, progress_);
+      drop_unlikely();
+      drop_uncertain();
+      if (fit_.rest_energy() > 0.95 * before) {
+        return;
+      }
     }
   }
 
@@ -217,30 +263,59 @@ class Search {
   std::size_t frames() const { return sound_[0].size(); }
 
  private:
+  struct Ranked {
+    double explained;  // Energy that the pole alone explains, approximately.
+    Complex log_z;
+  };
+  // Returns the poles, those that explain the most energy on their own first.
+  std::vector<Ranked> rank(const std::vector<Complex>& poles,
+                           const std::vector<std::vector<double>>& sound) const {
+    std::vector<Ranked> ranked;
+    for (const Complex log_z : poles) {
+      ranked.push_back({0.0, log_z});
+    }
+    for (const std::vector<double>& channel : sound) {
+      const std::vector<Moments> moments = moments_of(channel, poles);
+      for (std::size_t k = 0; k < poles.size(); ++k) {
+        ranked[k].explained -= std::norm(moments[k].zeroth) * poles[k].real();
+      }
+      progress_.spend(channel.size() * poles.size() / 4);
+    }
+    std::sort(ranked.begin(), ranked.end(),
+              [](const Ranked& a, const Ranked& b) { return a.explained > b.explained; });
+    return ranked;
+  }
+
   // Returns the poles that would each explain the most energy on their own.
-  std::vector<Complex> strongest(std::vector<Complex> found,
+  std::vector<Complex> strongest(const std::vector<Complex>& found,
                                  const std::vector<std::vector<double>>& start) const {
     const std::size_t room = most_ * 3 / 2;
     if (found.size() <= room) {
       return found;
     }
-    std::vector<std::pair<double, Complex>> ranked;
-    for (const Complex log_z : found) {
-      ranked.emplace_back(0.0, log_z);
+    const std::vector<Ranked> ranked = rank(found, start);
+    std::vector<Complex> strongest;
+    for (std::size_t i = 0; i < room; ++i) {
+      strongest.push_back(ranked[i].log_z);
     }
-    for (const std::vector<double>& channel : start) {
-      const std::vector<Moments> moments = moments_of(channel, found);
-      for (std::size_t k = 0; k < found.size(); ++k) {
-        ranked[k].first += std::norm(moments[k].zeroth) * found[k].real();
+    return strongest;
+  }
+
+  // Returns the poles that explain much of the residual, none near one that explains more.
+  std::vector<Complex> explaining(const std::vector<Complex>& poles) const {
+    constexpr double much = 0.1;  // Least share of the energy that the best one explains.
+    std::vector<Complex> best;
+    const std::vector<Ranked> ranked = rank(poles, fit_.rest());
+    for (const auto& [explained, log_z] : ranked) {
+      const auto is_near = [z = log_z](Complex other) {
+        return std::fabs(other.imag() - z.imag()) < 2.0 * std::max(-other.real(), -z.real());
+      };
+      if (explained > much * ranked[0].explained &&
+          std::none_of(best.begin(), best.end(), is_near)) {
+        best.push_back(log_z);
       }
     }
-    std::sort(ranked.begin(), ranked.end(),
-              [](const auto& a, const auto& b) { return a.first < b.first; });
-    found.clear();
-    for (std::size_t i = 0; i < room; ++i) {
-      found.push_back(ranked[i].second);
-    }
-    return found;
+    return best;
   }
 
   void add(const std::vector<Complex>& found) {
@@ -377,6 +452,7 @@ void search_all(Search& search, double rate_hz) {
         stage.most_alpha / static_cast<double>(lost));
     lost = frames_lost(wanted);
   }
+  search.add_damped_modes(highest);
   search.finish();
 }
 
@@ -473,7 +549,7 @@ std::vector<Found> all_found(const DampedFit& fit) {
   const std::vector<DampedDeviation> deviations = fit.deviations(true);
   for (std::size_t k = 0; k < fit.modes().size(); ++k) {
     all.push_back({fit.modes()[k], deviations[k]});
-    const double scale = std::sqrt(noise.variance(fit.modes()[k].log_z));
+    const double scale = std::sqrt(noise.variance_beside(fit.modes()[k].log_z, fit.modes()));
     all.back().deviation.alpha *= scale;
     all.back().deviation.omega *= scale;
     for (double& c : all.back().deviation.c) {
@@ -656,6 +732,7 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
   made.choices = try_choices(*search, std::max(energy_in(made.sound), 1e-300));
   search->keep_likely(options.least_modes);
   search->keep_best(options.most_modes, are(fates(false), Fate::steady));
+  search->remove(are(fates(options.least_modes == 0), Fate::unfit));
   std::vector<Found> kept;
   double steady_hz = 0.0;
   double steady_energy = 0.0;

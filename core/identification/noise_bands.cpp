@@ -6,6 +6,7 @@
 #include <complex>
 
 #include "core/linear_algebra/fourier.h"
+#include "core/noise.h"
 
 namespace ressort::identification {
 namespace {
@@ -99,6 +100,24 @@ std::vector<NoiseBand> noise_bands(const Identification& found) {
     bands.push_back(std::move(band));
   }
   return bands;
+}
+
+std::vector<std::vector<double>> sound_of(const std::vector<NoiseBand>& bands, std::size_t channels,
+                                          std::size_t frames, double rate_hz) {
+  std::vector<std::vector<double>> sound(channels, std::vector<double>(frames));
+  for (std::size_t b = 0; b < bands.size(); ++b) {
+    BandNoise noise(b + 1, bands[b].low_hz, bands[b].high_hz, rate_hz);
+    const double decay = std::pow(10.0, -3.0 / (bands[b].t60_s * rate_hz));
+    double envelope = 1.0;
+    for (std::size_t n = 0; n < frames; ++n) {
+      const double y = envelope * noise.next();
+      envelope *= decay;
+      for (std::size_t c = 0; c < channels; ++c) {
+        sound[c][n] += bands[b].level[c] * y;
+      }
+    }
+  }
+  return sound;
 }
 
 }  // namespace ressort::identification

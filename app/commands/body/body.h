@@ -17,6 +17,7 @@ struct BodyOptions {
   std::string input;
   std::string output;   // empty: stdout
   std::string picture;  // .svg; empty: none
+  std::string listen;   // folder for sounds; empty: none
   bool force = false;   // overwrites existing files
   bool as_json = false;
   std::optional<std::size_t> modes;  // all that stand above the noise if not given

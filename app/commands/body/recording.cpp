@@ -89,17 +89,23 @@ int recording_body(const BodyOptions& options) {
     std::fprintf(stderr, "%s: warning: %s\n", options.input.c_str(), warning.c_str());
   }
   const std::string source = options.input.substr(options.input.rfind('/') + 1);
+  const std::vector<NoiseBand> noise = noise_bands(*found);
+  const RecordingParts parts = parts_of(*found, noise);
   if (!options.picture.empty()) {
     if (const int code =
-            put_figure(options.picture, recording_figure(*found, source), options.force)) {
+            put_figure(options.picture, recording_figure(*found, parts, source), options.force)) {
       return code;
+    }
+  }
+  if (!options.listen.empty()) {
+    if (auto written = write_parts(options.listen, parts, options.force); !written) {
+      return reject("--listen: " + written.error().message);
     }
   }
   const std::string label = label_of_file(options.output.empty() ? options.input : options.output);
   std::string model = body_model(*found, label, source, options.mass);
   if (options.output.ends_with(".toml")) {
     const std::string file = options.output.substr(0, options.output.size() - 5) + ".mdl";
-    const std::vector<NoiseBand> noise = noise_bands(*found);
     const std::string preset =
         played_preset(*found, noise, file.substr(file.rfind('/') + 1), source);
     model = played_model(*found, noise, label, source, options.mass);

@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "app/commands/gallery/sound.h"
 #include "app/plot/plot.h"
 #include "core/identification/identify.h"
 #include "core/identification/noise_bands.h"
@@ -39,8 +40,24 @@ std::string choices_of(const Identification& found, const std::string& before,
 // Returns modes, residual and warnings as one JSON object.
 std::string identification_json(const Identification& found, double mass);
 
-// Three panels over frequency: the spectrum of the recording with the peak of each mode, the T60 of
-// each mode with its standard deviation, and the spectrum of the residual.
-plot::Figure recording_figure(const Identification& found, const std::string& title);
+// The analysed part of a recording, as recorded, and the parts of the body that plays it.
+struct RecordingParts {
+  Sound recording;
+  Sound modes;
+  Sound noise;
+  Sound sum;       // modes and noise
+  Sound residual;  // recording without modes
+};
+RecordingParts parts_of(const Identification& found, const std::vector<NoiseBand>& noise);
+
+// Writes recording.wav, modes.wav, noise.wav and sum.wav at equal loudness (ITU-R BS.1770), the
+// highest peak at -0.9 dBFS. Makes the folder. [main]
+Result<Done> write_parts(const std::string& folder, RecordingParts parts, bool force);
+
+// Two rows of panels: the spectrograms of the recording, of the body and of what its modes leave;
+// then the spectrum of the recording with the peak of each mode, the T60 of each mode with its
+// standard deviation, and the spectrum of the residual.
+plot::Figure recording_figure(const Identification& found, const RecordingParts& parts,
+                              const std::string& title);
 
 }  // namespace ressort::commands

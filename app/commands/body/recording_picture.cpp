@@ -4,8 +4,10 @@
 #include <bit>
 #include <cmath>
 #include <complex>
+#include <utility>
 #include <vector>
 
+#include "app/commands/gallery/spectrogram.h"
 #include "app/rooms.h"
 #include "app/text.h"
 #include "core/linear_algebra/fourier.h"
@@ -89,13 +91,39 @@ plot::Series peaks(const Identification& found, const Scale& scale) {
   return series;
 }
 
-plot::Panel spectrum_panel(const std::string& title, double height, const Scale& scale,
+plot::Panel spectrum_panel(const std::string& title, const Scale& scale,
                            std::vector<plot::Series> series) {
   return {.title = title,
           .x = plot::frequency_axis(lowest_hz, scale.highest_hz),
           .y = {.title = "dB", .from = floor_db, .to = 3.0},
           .series = std::move(series),
-          .height = height};
+          .height = 270.0};
+}
+
+// Three spectrograms with one gain, which sets the recording's peak to -12 dBFS.
+std::vector<plot::Panel> spectrogram_panels(const RecordingParts& parts) {
+  constexpr std::size_t rows = 109;  // 12 in an octave
+  constexpr std::size_t columns = 120;
+  constexpr double longest_s = 2.0;
+  const double length_s =
+      std::min(longest_s, static_cast<double>(parts.recording.frames()) / parts.recording.rate_hz);
+  const double gain_db = -12.0 - peak_dbfs(parts.recording);
+  std::vector<plot::Panel> panels;
+  const std::pair<const char*, const Sound*> shown[] = {{"Recording", &parts.recording},
+                                                        {"Modes and noise", &parts.sum},
+                                                        {"Without the modes", &parts.residual}};
+  for (const auto& [title, sound] : shown) {
+    Spectrogram cells = find_spectrogram(*sound, {0.0, length_s}, rows, columns);
+    for (double& cell : cells.dbfs) {
+      cell += gain_db;
+    }
+    panels.push_back(spectrogram_panel(cells, {50.0, 100.0, 200.0, 500.0, 1e3, 2e3, 5e3, 1e4}));
+    panels.back().title = title;
+    panels.back().x.title = "s";
+    panels.back().y.title = "Hz";
+    panels.back().height = 300.0;
+  }
+  return panels;
 }
 
 plot::Panel decay_panel(const Identification& found, const Scale& scale) {
@@ -115,7 +143,7 @@ plot::Panel decay_panel(const Identification& found, const Scale& scale) {
                                   std::max(0.1 * t60_s.value, t60_s.value - t60_s.deviation),
                                   t60_s.value + t60_s.deviation});
   }
-  plot::Panel panel = spectrum_panel("T60 of each mode", 190.0, scale, {bars, deviations});
+  plot::Panel panel = spectrum_panel("T60 of each mode", scale, {bars, deviations});
   panel.y = {.title = "s",
              .from = std::pow(10.0, std::floor(std::log10(0.7 * least))),
              .to = std::pow(10.0, std::ceil(std::log10(1.1 * most))),
@@ -125,20 +153,23 @@ plot::Panel decay_panel(const Identification& found, const Scale& scale) {
 
 }  // namespace
 
-plot::Figure recording_figure(const Identification& found, const std::string& title) {
+plot::Figure recording_figure(const Identification& found, const RecordingParts& parts,
+                              const std::string& title) {
   const std::size_t size = std::bit_ceil(found.sound[0].size());
   const std::vector<double> bins = magnitudes(found.sound, size);
   const Scale scale{.rate_hz = found.rate_hz,
                     .highest_hz = std::min(20000.0, 0.5 * found.rate_hz),
                     .reference = std::max(1e-30, *std::max_element(bins.begin(), bins.end()))};
-  return {
-      .title = title + ": " + counted(found.modes.size(), "mode", "modes"),
-      .panel_width = 900.0,
-      .panels = {spectrum_panel("Spectrum of the recording, and the peak of each mode", 310.0,
-                                scale, {filled(bins, scale, "#777777"), peaks(found, scale)}),
-                 decay_panel(found, scale),
-                 spectrum_panel("Residual: " + fixed(found.residual_db, 1) + " dB", 230.0, scale,
-                                {filled(magnitudes(found.residual, size), scale, "#4a74a8")})}};
+  plot::Figure figure{.title = title + ": " + counted(found.modes.size(), "mode", "modes"),
+                      .columns = 3,
+                      .panels = spectrogram_panels(parts)};
+  figure.panels.push_back(spectrum_panel("Spectrum and the peak of each mode", scale,
+                                         {filled(bins, scale, "#777777"), peaks(found, scale)}));
+  figure.panels.push_back(decay_panel(found, scale));
+  figure.panels.push_back(
+      spectrum_panel("Residual: " + fixed(found.residual_db, 1) + " dB", scale,
+                     {filled(magnitudes(found.residual, size), scale, "#4a74a8")}));
+  return figure;
 }
 
 }  // namespace ressort::commands

@@ -8,9 +8,6 @@
 namespace ressort::commands {
 namespace {
 
-// Levels of a spectrogram, from white to black.
-constexpr double lightest_dbfs = -96.0;
-constexpr double darkest_dbfs = -16.0;
 constexpr double level_floor_dbfs = -72.0;
 constexpr double level_step_db = 4.0;  // step between two shades of the figure of all presets
 
@@ -27,46 +24,20 @@ std::string link_to(const std::string& file) {
   return link;
 }
 
-// A spectrogram's rows are at equal ratios of frequency, so its axis counts octaves.
-double octave_of(double frequency_hz) {
-  return std::log2(frequency_hz);
-}
-
 // The cells as an image, and a dot at the fundamental of each note, where its key goes down.
-plot::Panel spectrogram_panel(const ShownPreset& preset, const Spectrogram& shown,
-                              std::initializer_list<double> ticks_hz) {
-  const double step_s = (shown.to_s - shown.from_s) / static_cast<double>(shown.columns);
-  const double step_octaves = (octave_of(shown.highest_hz) - octave_of(shown.lowest_hz)) /
-                              static_cast<double>(shown.rows - 1);
-  plot::Series cells{.style = "image", .is_matrix = true};
-  cells.columns = "(" + fixed(shown.from_s + 0.5 * step_s, 9) + "+" + fixed(step_s, 9) + "*$1):(" +
-                  fixed(octave_of(shown.lowest_hz), 9) + "+" + fixed(step_octaves, 9) + "*$2):3";
-  for (std::size_t row = 0; row < shown.rows; ++row) {
-    for (std::size_t column = 0; column < shown.columns; ++column) {
-      cells.data += fixed(std::max(lightest_dbfs, shown.at(row, column)), 0) + " ";
-    }
-    cells.data += "\n";
-  }
+plot::Panel notes_panel(const ShownPreset& preset, const Spectrogram& shown,
+                        std::initializer_list<double> ticks_hz) {
+  plot::Panel panel = spectrogram_panel(shown, ticks_hz);
   plot::Series rim{.style = "points pt 7 ps 0.75 lc rgb '#ffffff'"};
   plot::Series dots{.style = "points pt 7 ps 0.5 lc rgb '" + std::string(plot::accent) + "'"};
   for (const ShownNote& note : preset.notes) {
     if (note.fundamental_hz >= shown.lowest_hz && note.fundamental_hz <= shown.highest_hz) {
-      dots.data += plot::row({note.note.start_s, octave_of(note.fundamental_hz)});
+      dots.data += plot::row({note.note.start_s, std::log2(note.fundamental_hz)});
     }
   }
   rim.data = dots.data;
-  plot::Panel panel{.x = {.from = shown.from_s, .to = shown.to_s},
-                    .y = {.from = octave_of(shown.lowest_hz), .to = octave_of(shown.highest_hz)},
-                    .series = {cells},
-                    .colours = plot::ColourMap::grey,
-                    .lightest = lightest_dbfs,
-                    .darkest = darkest_dbfs};
   if (!dots.data.empty()) {
     panel.series.insert(panel.series.end(), {rim, dots});
-  }
-  for (const double hz : ticks_hz) {
-    panel.y.ticks.push_back(
-        {octave_of(hz), hz < 1000.0 ? fixed(hz, 0) : fixed(hz / 1000.0, 0) + "k"});
   }
   return panel;
 }
@@ -210,8 +181,8 @@ std::string gallery_page(const std::vector<ShownPreset>& presets, const std::str
 }
 
 plot::Figure preset_figure(const ShownPreset& preset) {
-  plot::Panel cells = spectrogram_panel(preset, preset.spectrogram,
-                                        {50.0, 100.0, 200.0, 500.0, 1e3, 2e3, 5e3, 1e4});
+  plot::Panel cells =
+      notes_panel(preset, preset.spectrogram, {50.0, 100.0, 200.0, 500.0, 1e3, 2e3, 5e3, 1e4});
   cells.x.title = "s";
   cells.y.title = "Hz";
   cells.scale_title = "dBFS";
@@ -230,7 +201,7 @@ plot::Figure gallery_figure(const std::vector<ShownPreset>& presets) {
       for (double& cell : small.dbfs) {
         cell = level_step_db * std::round(cell / level_step_db);
       }
-      figure.panels.push_back(spectrogram_panel(preset, small, {100.0, 1e3, 1e4}));
+      figure.panels.push_back(notes_panel(preset, small, {100.0, 1e3, 1e4}));
       figure.panels.back().title = preset.name;
     }
   }

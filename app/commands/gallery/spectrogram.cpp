@@ -4,9 +4,14 @@
 #include <cmath>
 #include <numbers>
 
+#include "app/text.h"
+
 namespace ressort::commands {
 namespace {
 
+// Levels in a figure, from white to black.
+constexpr double lightest_dbfs = -96.0;
+constexpr double darkest_dbfs = -16.0;
 constexpr double periods = 34.0;
 constexpr double shortest_window_s = 0.012;
 constexpr double longest_window_s = 0.3;
@@ -97,6 +102,34 @@ Spectrogram downsampled(const Spectrogram& from, std::size_t rows, std::size_t c
     }
   }
   return made;
+}
+
+plot::Panel spectrogram_panel(const Spectrogram& shown, std::initializer_list<double> ticks_hz) {
+  // The rows are at equal ratios of frequency, so the axis counts octaves.
+  const double lowest = std::log2(shown.lowest_hz);
+  const double highest = std::log2(shown.highest_hz);
+  const double step_s = (shown.to_s - shown.from_s) / static_cast<double>(shown.columns);
+  const double step_octaves = (highest - lowest) / static_cast<double>(shown.rows - 1);
+  plot::Series cells{.style = "image", .is_matrix = true};
+  cells.columns = "(" + fixed(shown.from_s + 0.5 * step_s, 9) + "+" + fixed(step_s, 9) + "*$1):(" +
+                  fixed(lowest, 9) + "+" + fixed(step_octaves, 9) + "*$2):3";
+  for (std::size_t row = 0; row < shown.rows; ++row) {
+    for (std::size_t column = 0; column < shown.columns; ++column) {
+      cells.data += fixed(std::max(lightest_dbfs, shown.at(row, column)), 0) + " ";
+    }
+    cells.data += "\n";
+  }
+  plot::Panel panel{.x = {.from = shown.from_s, .to = shown.to_s},
+                    .y = {.from = lowest, .to = highest},
+                    .series = {cells},
+                    .colours = plot::ColourMap::grey,
+                    .lightest = lightest_dbfs,
+                    .darkest = darkest_dbfs};
+  for (const double hz : ticks_hz) {
+    panel.y.ticks.push_back(
+        {std::log2(hz), hz < 1000.0 ? fixed(hz, 0) : fixed(hz / 1000.0, 0) + "k"});
+  }
+  return panel;
 }
 
 }  // namespace ressort::commands

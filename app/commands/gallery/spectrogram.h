@@ -2,10 +2,11 @@
 #pragma once
 
 #include <cstddef>
-#include <string>
+#include <initializer_list>
 #include <vector>
 
 #include "app/commands/gallery/sound.h"
+#include "app/plot/plot.h"
 
 namespace ressort::commands {
 
@@ -30,5 +31,8 @@ Spectrogram find_spectrogram(const Sound& sound, Stretch stretch, std::size_t ro
 
 // Downsamples to fewer cells, each with its highest level.
 Spectrogram downsampled(const Spectrogram& from, std::size_t rows, std::size_t columns);
+
+// Draws the cells as an image, from white at -96 to black at -16 dBFS.
+plot::Panel spectrogram_panel(const Spectrogram& shown, std::initializer_list<double> ticks_hz);
 
 }  // namespace ressort::commands

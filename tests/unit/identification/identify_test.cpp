@@ -327,6 +327,99 @@ TEST_CASE("Stated uncertainties match the errors", "[identify]") {
   }
 }
 
+namespace {
+
+// Shares of the figures (frequency, T60, amplitude, phase) within two standard deviations.
+struct Coverage {
+  double within[4] = {};
+  std::size_t modes = 0;
+  std::size_t missing = 0;
+  std::size_t extra = 0;
+};
+
+// Each known mode counts with the nearest found one. The noise is `noise_db` below the sound's mean
+// power over its length.
+void add_trial(std::vector<KnownMode> known, double noise_db, Random& random, Coverage& all) {
+  std::vector<double> sound = ringing(known, 1.0);
+  double energy = 0.0;
+  for (const double x : sound) {
+    energy += x * x;
+  }
+  const double rms = std::sqrt(energy / static_cast<double>(sound.size()));
+  sound = with_noise(std::move(sound), rms * std::pow(10.0, noise_db / 20.0), random);
+  const Identification found = identified({sound});
+  std::vector<IdentifiedMode> left = found.modes;
+  const auto distance = [](const KnownMode& mode, const IdentifiedMode& other) {
+    return std::hypot(2.0 * std::numbers::pi * (other.frequency_hz.value - mode.frequency_hz),
+                      std::log(1000.0) / other.t60_s.value - mode.alpha()) /
+           mode.alpha();
+  };
+  while (!known.empty() && !left.empty()) {
+    std::size_t best = 0;
+    std::size_t best_known = 0;
+    for (std::size_t k = 0; k < known.size(); ++k) {
+      for (std::size_t j = 0; j < left.size(); ++j) {
+        if (distance(known[k], left[j]) < distance(known[best_known], left[best])) {
+          best = j;
+          best_known = k;
+        }
+      }
+    }
+    const KnownMode mode = known[best_known];
+    const IdentifiedMode other = left[best];
+    const double amplitude = mode.amplitude * std::exp(-mode.alpha() * found.time_zero_s);
+    const double off[] = {
+        (other.frequency_hz.value - mode.frequency_hz) / other.frequency_hz.deviation,
+        (other.t60_s.value - mode.t60_s) / other.t60_s.deviation,
+        (other.amplitude[0].value - amplitude) / other.amplitude[0].deviation,
+        miss_of(mode, other, found.time_zero_s).phase_rad / other.phase_rad[0].deviation};
+    for (int i = 0; i < 4; ++i) {
+      all.within[i] += std::fabs(off[i]) < 2.0 ? 1.0 : 0.0;
+    }
+    ++all.modes;
+    known.erase(known.begin() + static_cast<std::ptrdiff_t>(best_known));
+    left.erase(left.begin() + static_cast<std::ptrdiff_t>(best));
+  }
+  all.missing += known.size();
+  all.extra += left.size();
+}
+
+}  // namespace
+
+TEST_CASE("Two standard deviations contain the truth in 95 % of all trials", "[identify]") {
+  const int trials = of_all(6, 200);
+  Random random(85);
+  const auto phase = [&] { return random.uniform(-std::numbers::pi, std::numbers::pi); };
+  Coverage all;
+  double least = 0.0;
+  SECTION("two modes 1 Hz apart with a T60 of 0.3 s, which overlap by seven times their distance") {
+    for (int trial = 0; trial < trials; ++trial) {
+      const double hz = 150.0 * std::pow(10.0, random.uniform(0.0, 1.0));
+      add_trial({{hz, 0.3, 1.0, phase()}, {hz + 1.0, 0.3, 1.0, phase()}}, -60.0, random, all);
+    }
+    // 6 trials: the two modes err together, so at least 4 of 6 trials.
+    least = of_all(0.6, 0.93);
+  }
+  SECTION("twelve modes with a Q of 5 to 20 and noise at -20 dB") {
+    for (int trial = 0; trial < trials; ++trial) {
+      std::vector<KnownMode> known;
+      for (int k = 0; k < 12; ++k) {
+        const double hz = 120.0 * std::pow(80.0, (k + random.uniform(0.0, 0.4)) / 12.0);
+        const double quality = random.uniform(5.0, 20.0);
+        known.push_back({hz, std::log(1000.0) * quality / (std::numbers::pi * hz), 1.0, phase()});
+      }
+      add_trial(known, -20.0, random, all);
+    }
+    // Three standard deviations of 0.954 of 72 and of 2400 figures.
+    least = of_all(0.88, 0.94);
+  }
+  CHECK(all.missing == 0);
+  CHECK(static_cast<double>(all.extra) <= 0.05 * static_cast<double>(all.modes));
+  for (const double within : all.within) {
+    CHECK(within / static_cast<double>(all.modes) >= least);
+  }
+}
+
 TEST_CASE("A mode limit keeps the strongest modes, none below the floor", "[identify]") {
   const std::vector<KnownMode> known = {{300.0, 1.0, 1.0, 0.0},      // energy 0 dB
                                         {500.0, 0.1, 1.0, 0.0},      // -10 dB
@@ -375,11 +468,14 @@ TEST_CASE("The residual of fewer modes is reported, and missing modes give a war
   Random random(95);
   const std::vector<std::vector<double>> sound = {
       with_noise(ringing(thirty(96), 1.0), 0.01, random)};
-  const Identification found = identified(sound, 44100.0, {.most_modes = 40, .least_modes = 40});
+  const Identification clean =
+      identified({ringing(thirty(96), 1.0)}, 44100.0, {.most_modes = 40, .least_modes = 40});
+  REQUIRE(clean.modes.size() == 30);
+  REQUIRE(clean.warnings.size() == 1);
+  CHECK(clean.warnings[0] == "only 30 modes were found");
+  const Identification found = identified(sound);
   REQUIRE(found.modes.size() == 30);
-  REQUIRE(found.warnings.size() == 1);
-  CHECK(found.warnings[0] == "only 30 modes were found");
-  REQUIRE(found.choices.size() == 3);
+  REQUIRE(found.choices.size() >= 3);
   CHECK(found.choices[0].modes == 5);
   CHECK(found.choices[2].modes == 20);
   for (std::size_t i = 0; i + 1 < found.choices.size(); ++i) {
