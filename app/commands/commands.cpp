@@ -13,6 +13,7 @@
 #include "app/commands/progress_bar.h"
 #include "app/say.h"
 #include "app/session/load_progress.h"
+#include "app/session/problem_reports.h"
 
 namespace ressort::commands {
 namespace {
@@ -104,10 +105,9 @@ int render_command(const RenderOptions& options, bool is_quiet) {
     }
   }
   if (rendered->resets > 0) {
-    const bool is_once = rendered->resets == 1;
-    print_error(rendered->name + (is_once ? ": a voice" : ": voices") +
-                " became unstable and faded out" +
-                (is_once ? "" : " " + std::to_string(rendered->resets) + " times") +
+    print_error(rendered->name + ": a voice was faded out" +
+                (rendered->resets == 1 ? "" : " " + std::to_string(rendered->resets) + " times") +
+                ", because " + session::reset_cause(rendered->is_proved) +
                 "; the output is not valid");
   }
   return rendered->was_interrupted ? exit_code::our_failure : exit_code::done;

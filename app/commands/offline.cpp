@@ -478,6 +478,7 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
   rendered.rms =
       frame > 0 ? std::sqrt(energy / static_cast<double>(frame * rendered.channels)) : 0.0;
   rendered.resets = process.meters().resets;
+  rendered.is_proved = instrument.verdict == Verdict::stable;
   if (const std::uint64_t wrong = process.meters().malformed; wrong > 0) {
     rendered.warnings.push_back(options.midi + ": ignored " +
                                 counted(wrong, "message", "messages") +

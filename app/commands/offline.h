@@ -52,6 +52,7 @@ struct Rendered {
   double rms = 0.0;
   double cpu_s = 0.0;  // CPU time of this thread, without loading
   std::uint64_t resets = 0;
+  bool is_proved = false;  // stable
   bool was_interrupted = false;
   std::vector<std::string> warnings;
   std::optional<Error> failure;  // error of the disk; no file is kept

@@ -8,11 +8,13 @@
 
 namespace ressort::session {
 
+std::string reset_cause(bool is_proved) {
+  return is_proved ? "it was pushed too hard; lower the force"
+                   : "it became unstable; lower its stiffness or damping, or raise its mass";
+}
+
 void ProblemReports::add_reset(const std::string& model, bool is_proved) {
-  resets_.add(model + (is_proved ? ": a voice was faded out, because it was pushed too hard; lower "
-                                   "the force"
-                                 : ": a voice became unstable and was faded out; lower its "
-                                   "stiffness or damping, or raise its mass"));
+  resets_.add(model + ": a voice was faded out, because " + reset_cause(is_proved));
 }
 
 void ProblemReports::add_overload(const Report& report) {

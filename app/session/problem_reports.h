@@ -11,12 +11,16 @@
 
 namespace ressort::session {
 
+// Returns why a voice was faded out, and what to do. In a model that is proved stable, a force was
+// too large.
+std::string reset_cause(bool is_proved);
+
 // [worker]
 class ProblemReports {
  public:
   explicit ProblemReports(Precision precision) : precision_(precision) {}
 
-  // A voice of this model became unstable. A model that is proved stable was pushed too hard.
+  // A voice of this model became unstable.
   void add_reset(const std::string& model, bool is_proved);
   // The load is too high.
   void add_overload(const Report& report);

@@ -431,7 +431,12 @@ rm -f killed.part.wav
 # The stability check.
 expect 2 "wild.mdl:3:1: error: unstable: the stiffness 5 of 'r' must stay below 4; pass --force to play it anyway" \
   "$program" render wild.mdl -o wild.wav --seconds 1
-expect 0 "became unstable" "$program" render wild.mdl -o wild.wav --seconds 1 --force
+expect 0 "faded out, because it became unstable; lower its stiffness or damping, or raise its mass" \
+  "$program" render wild.mdl -o wild.wav --seconds 1 --force
+# A stable model is not to blame for a force beyond all numbers.
+printf '0.1 /in/1/force 1e30\n' > hard.score
+expect 0 "faded out, because it was pushed too hard; lower the force; the output is not valid" \
+  "$program" render PolyTriangle -o hard.wav --seconds 0.5 --score hard.score
 expect 0 "wild.mdl:3:1: warning: unstable: the stiffness 5 of 'r'" \
   "$program" render wild.mdl -o wild.wav --seconds 1 --force
 expect 2 "wild.mdl:3:1: error: unstable" "$program" play wild.mdl -a dummy -i
