@@ -3,7 +3,7 @@
 
 namespace ressort {
 
-extern const char* const version;  // "0.1.0"
+extern const char* const version;  // "1.0.0"
 extern const char* const commit;   // ten digits, with '+' for a modified checkout, or "unknown"
 
 }  // namespace ressort

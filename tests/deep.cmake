@@ -29,8 +29,9 @@ endforeach()
 add_deep_test(everything_sanitized 240 ${CMAKE_CURRENT_SOURCE_DIR}/system/sanitized 0.1 200)
 add_deep_test(everything_more 240 $<TARGET_FILE:ressort_play_everything> 1 400 101)
 
-# Compiles the engine for 64-bit ARM.
-add_deep_test(arm 60 ${CMAKE_CURRENT_SOURCE_DIR}/arm.sh ${CMAKE_SOURCE_DIR})
+# Compiles the engine for 64-bit ARM, and the program where its libraries are installed.
+add_deep_test(arm 60 ${CMAKE_CURRENT_SOURCE_DIR}/arm.sh ${CMAKE_SOURCE_DIR}
+  ${CMAKE_BINARY_DIR})
 
 # All random networks in all forms on all instruction sets.
 add_deep_test(forms_everywhere 240 $<TARGET_FILE:ressort_tests> "[forms_everywhere]")

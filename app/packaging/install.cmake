@@ -4,8 +4,8 @@ include(GNUInstallDirs)
 set(packaging ${CMAKE_CURRENT_LIST_DIR})
 set(packaged ${CMAKE_BINARY_DIR}/packaging)
 
-# Manual page and completion, printed by the program. Not possible in cross builds.
-if(NOT CMAKE_CROSSCOMPILING)
+# Manual page and completion, printed by the program. A cross build needs an emulator for it.
+if(NOT CMAKE_CROSSCOMPILING OR CMAKE_CROSSCOMPILING_EMULATOR)
   add_custom_command(TARGET ressort POST_BUILD
     COMMAND ${CMAKE_COMMAND} -E make_directory ${packaged}
     COMMAND ressort reference man > ${packaged}/ressort.1
@@ -33,7 +33,7 @@ string(REGEX REPLACE "\n" "\n " licence "${licence}")
 configure_file(${packaging}/copyright.in ${packaged}/copyright @ONLY)
 file(WRITE ${packaged}/changelog "ressort (${PROJECT_VERSION}) stable; urgency=medium\n\n"
   "  * The first package.\n\n"
-  " -- ressort <ressort@users.noreply.github.com>  Sun, 01 Nov 2026 12:00:00 +0000\n")
+  " -- ressort <ressort@users.noreply.github.com>  Sat, 28 Nov 2026 12:00:00 +0000\n")
 execute_process(COMMAND gzip -9nkf ${packaged}/changelog)
 install(FILES ${packaged}/copyright ${packaged}/changelog.gz DESTINATION ${documents})
 
