@@ -3,6 +3,7 @@
 
 #include "app/command_line/command_lines.h"
 #include "app/command_line/options.h"
+#include "app/commands/body/body.h"
 
 namespace ressort::command_line {
 namespace {
@@ -132,10 +133,20 @@ CLI::Option* unused_by_statistics(CLI::App& command) {
 
 }  // namespace
 
-void add_body(CLI::App& app, BodyRequest& request, int& code) {
+void add_body(CLI::App& app, int& code) {
   CLI::App* command = app.add_subcommand(
       "body", "makes a modal body from a recording, a solid, a model or statistics");
   command->footer(examples);
+  BodyRequest& request = run_with<BodyRequest>(*command, code, [command](const auto& chosen) {
+    const bool is_statistical = !chosen.statistical.statistics.density.empty();
+    if (!is_statistical && chosen.input.empty()) {
+      throw CLI::RequiredError("FILE or --statistical");
+    }
+    if (CLI::Option* unused = is_statistical ? unused_by_statistics(*command) : nullptr) {
+      throw CLI::ExcludesError(unused->get_name(), "--statistical");
+    }
+    return body_command(chosen);
+  });
   command->add_option("FILE", request.input, "recording, solid or model")->type_name("PATH");
   add_output(*command, request.output, "model to write (default: print)");
   command
@@ -165,16 +176,6 @@ void add_body(CLI::App& app, BodyRequest& request, int& code) {
       ->type_name("PLACE");
   command->option_defaults()->group("Statistics");
   add_statistics(*command, request.statistical.statistics);
-  command->callback([command, &request, &code] {
-    const bool is_statistical = !request.statistical.statistics.density.empty();
-    if (!is_statistical && request.input.empty()) {
-      throw CLI::RequiredError("FILE or --statistical");
-    }
-    if (CLI::Option* unused = is_statistical ? unused_by_statistics(*command) : nullptr) {
-      throw CLI::ExcludesError(unused->get_name(), "--statistical");
-    }
-    code = body_command(request);
-  });
 }
 
 }  // namespace ressort::command_line

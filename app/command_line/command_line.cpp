@@ -5,6 +5,7 @@
 #include <string>
 
 #include "app/command_line/command_lines.h"
+#include "app/commands/commands.h"
 #include "app/exit_code.h"
 #include "app/version.h"
 
@@ -20,35 +21,17 @@ int run_command_line(int argc, char** argv) {
   app.name("ressort");
   app.require_subcommand(0, 1);
   int code = exit_code::done;
-  PlayOptions play_options;
-  RenderChoice render_choice;
-  CheckOptions check_options;
-  ExportOptions export_options;
-  BodyRequest body_request;
-  ModesOptions modes_options;
-  DescribeOptions describe_options;
-  ShapeOptions shape_options;
-  MakeChoice make_choice;
-  ChartOptions chart_options;
-  std::string reference_part;
-  add_play(app, play_options, code);
-  add_render(app, render_choice, code);
-  add_check(app, check_options, code);
-  add_make(app, make_choice, code);
-  add_export(app, export_options, code);
-  add_modes(app, modes_options, code);
-  add_describe(app, describe_options, code);
-  add_shape(app, shape_options, code);
-  add_body(app, body_request, code);
-  add_chart(app, chart_options, code);
-  add_reference(app, reference_part, code);
+  for (const auto add : {add_play, add_render, add_check, add_make, add_export, add_modes,
+                         add_describe, add_shape, add_body, add_chart, add_reference}) {
+    add(app, code);
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? exit_code::done : exit_code::wrong_use;
   }
   if (app.get_subcommands().empty() && std::getenv("NSM_URL") != nullptr) {
-    return play(play_options);  // session managers start programs without arguments
+    return play(PlayOptions());  // session managers start programs without arguments
   }
   if (app.get_subcommands().empty()) {
     std::fprintf(stderr, "%s", app.help().c_str());

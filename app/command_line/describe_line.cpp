@@ -2,8 +2,8 @@
 
 #include "app/command_line/command_lines.h"
 #include "app/command_line/options.h"
+#include "app/commands/commands.h"
 #include "app/commands/timbre/sweep.h"
-#include "core/model/language/expression.h"
 
 namespace ressort::command_line {
 namespace {
@@ -23,26 +23,13 @@ const char* const describe_examples =
     "  ressort describe SixStructures --sweep timbre=1:6:51 -o mixes.csv -o mixes.svg\n"
     "  ressort describe bell.wav --json --f0 220 | jq '.frames[].inharmonicity'\n";
 
-// Accepts whole numbers within a range.
-CLI::Validator whole(double least, double most) {
-  const std::string range = print_number(least) + " to " + print_number(most);
-  return {[=](std::string& text) {
-            double number = 0.0;
-            return parse_number(text, number) &&
-                           number == static_cast<double>(static_cast<long long>(number)) &&
-                           number >= least && number <= most
-                       ? std::string()
-                       : "must be a whole number, " + range + ", found " + text;
-          },
-          range};
-}
-
 }  // namespace
 
-void add_describe(CLI::App& app, DescribeOptions& options, int& code) {
+void add_describe(CLI::App& app, int& code) {
   CLI::App* command =
       app.add_subcommand("describe", "measures a sound: brightness, hollowness, noise, length");
   command->footer(describe_examples);
+  DescribeOptions& options = run_with<DescribeOptions>(*command, code, describe_command);
   command->add_option("FILE", options.name, "sound file, preset or model, by name or file")
       ->type_name("NAME")
       ->required();
@@ -98,7 +85,6 @@ void add_describe(CLI::App& app, DescribeOptions& options, int& code) {
   add_parsed(*command, "--law", options.laws, parse_law,
              "formula to plot beside a figure: FIGURE=FORMULA");
   add_motion(*command, options.third);
-  command->callback([&options, &code] { code = describe_command(options); });
 }
 
 }  // namespace ressort::command_line

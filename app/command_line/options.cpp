@@ -1,20 +1,35 @@
 #include "app/command_line/options.h"
 
+#include <cmath>
 #include <string>
 
 #include "core/model/language/expression.h"
 
 namespace ressort::command_line {
 
-CLI::Validator within(double least, double most) {
+namespace {
+
+CLI::Validator numbers(double least, double most, bool are_whole) {
   const std::string range = print_number(least) + " to " + print_number(most);
   return {[=](std::string& text) {
             double number = 0.0;
-            return parse_number(text, number) && number >= least && number <= most
+            return parse_number(text, number) && number >= least && number <= most &&
+                           (!are_whole || number == std::floor(number))
                        ? std::string()
-                       : "must be " + range + ", found " + text;
+                       : (are_whole ? "must be a whole number, " : "must be ") + range +
+                             ", found " + text;
           },
           range};
+}
+
+}  // namespace
+
+CLI::Validator within(double least, double most) {
+  return numbers(least, most, false);
+}
+
+CLI::Validator whole(double least, double most) {
+  return numbers(least, most, true);
 }
 
 CLI::Option* add_model(CLI::App& command, std::string& name, const std::string& help) {

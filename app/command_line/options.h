@@ -2,6 +2,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -15,8 +16,19 @@
 
 namespace ressort::command_line {
 
+// Makes the options of a command, which live as long as it. After parsing, run(options) sets the
+// exit code.
+template <class Options, class Run>
+Options& run_with(CLI::App& command, int& code, Run run) {
+  const auto options = std::make_shared<Options>();
+  command.callback([options, run, &code] { code = run(*options); });
+  return *options;
+}
+
 // Accepts numbers within a range; rejects NaN and words.
 CLI::Validator within(double least, double most);
+// Accepts whole numbers within a range.
+CLI::Validator whole(double least, double most);
 
 // The preset or model to load.
 CLI::Option* add_model(CLI::App& command, std::string& name, const std::string& help);

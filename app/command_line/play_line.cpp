@@ -3,6 +3,7 @@
 
 #include "app/command_line/command_lines.h"
 #include "app/command_line/options.h"
+#include "app/commands/commands.h"
 #include "app/commands/smf/midi_file.h"
 #include "core/model/language/expression.h"
 
@@ -22,9 +23,10 @@ const char* const play_examples =
 
 }  // namespace
 
-void add_play(CLI::App& app, PlayOptions& options, int& code) {
+void add_play(CLI::App& app, int& code) {
   CLI::App* command = app.add_subcommand("play", "plays a preset or a model live");
   command->footer(play_examples);
+  PlayOptions& options = run_with<PlayOptions>(*command, code, play);
   add_model(*command, options.name, "preset or model, by name or file; a .mid or .ressort file")
       ->capture_default_str();
   command->add_option("-a,--audio", options.audio, "audio backend: auto, jack, alsa or dummy")
@@ -151,7 +153,6 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
                     "exit with 75 when the audio server ends, instead of waiting");
   command->add_flag("--watch", options.watch,
                     "reload the model and the preset when their files change");
-  command->callback([&options, &code] { code = play(options); });
 }
 
 }  // namespace ressort::command_line

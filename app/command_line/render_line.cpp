@@ -3,6 +3,7 @@
 
 #include "app/command_line/command_lines.h"
 #include "app/command_line/options.h"
+#include "app/commands/commands.h"
 
 namespace ressort::command_line {
 namespace {
@@ -24,14 +25,35 @@ const char* const render_examples =
     "  ressort render my.mdl -o out.wav --input gesture.wav --format double\n"
     "  ressort render --all-presets -o sounds      then open sounds/index.html\n";
 
+struct RenderChoice {
+  RenderOptions options;
+  bool all_presets = false;
+  bool is_quiet = false;
+};
+
 }  // namespace
 
-void add_render(CLI::App& app, RenderChoice& choice, int& code) {
-  RenderOptions& options = choice.options;
+void add_render(CLI::App& app, int& code) {
   CLI::App* command = app.add_subcommand("render", "renders a preset or a model to a sound file");
   command->footer(render_examples);
-  CLI::Option* model = add_model(*command, options.name,
-                                 "preset or model, by name or file; a .ressort file (last 30 s)");
+  RenderChoice& choice = run_with<RenderChoice>(*command, code, [command](const auto& chosen) {
+    if (!chosen.all_presets && command->count("MODEL") == 0) {
+      throw CLI::RequiredError("MODEL");
+    }
+    if (!chosen.all_presets) {
+      return render_command(chosen.options, chosen.is_quiet);
+    }
+    const std::set<std::string> taken = {"all-presets", "output", "rate", "quiet"};
+    for (const CLI::Option* option : command->get_options()) {
+      if (option->count() > 0 && !taken.contains(option->get_single_name())) {
+        throw CLI::ExcludesError("--all-presets", option->get_name());
+      }
+    }
+    return gallery_command({chosen.options.output, chosen.options.rate_hz, chosen.is_quiet});
+  });
+  RenderOptions& options = choice.options;
+  add_model(*command, options.name,
+            "preset or model, by name or file; a .ressort file (last 30 s)");
   std::string endings;
   for (const std::string_view ending : sound_endings()) {
     endings += (endings.empty() ? "" : " ") + std::string(ending);
@@ -39,11 +61,11 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
   command->add_option("-o,--output", options.output, "sound file to write: " + endings)
       ->type_name("FILE")
       ->required();
-  CLI::Option* seconds = command->add_option("-s,--seconds", choice.seconds, "duration in s")
-                             ->check(within(0.0, 86400.0));
-  CLI::Option* frames = command->add_option("--frames", choice.frames, "duration in samples")
-                            ->check(within(0.0, 1e10))
-                            ->excludes(seconds);
+  command->add_option("-s,--seconds", options.seconds, "duration in s")
+      ->check(within(0.0, 86400.0));
+  command->add_option("--frames", options.frames, "duration in samples")
+      ->check(within(0.0, 1e10))
+      ->excludes("--seconds");
   add_rate(*command, "-r,--rate", options.rate_hz, 1000.0, 768000.0);
   command->add_option("--input", options.input, "sound file whose channel N drives input N")
       ->type_name("FILE");
@@ -79,28 +101,6 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
   command->add_flag("--all-presets", choice.all_presets,
                     "render all presets to the folder -o, with a page that compares them");
   command->add_flag("-q,--quiet", choice.is_quiet, "print errors only");
-  command->callback([&choice, command, model, seconds, frames, &code] {
-    if (choice.all_presets) {
-      const std::set<std::string> taken = {"all-presets", "output", "rate", "quiet"};
-      for (const CLI::Option* option : command->get_options()) {
-        if (option->count() > 0 && !taken.contains(option->get_single_name())) {
-          throw CLI::ExcludesError("--all-presets", option->get_name());
-        }
-      }
-      code = gallery_command({choice.options.output, choice.options.rate_hz, choice.is_quiet});
-      return;
-    }
-    if (model->count() == 0) {
-      throw CLI::RequiredError("MODEL");
-    }
-    if (seconds->count() > 0) {
-      choice.options.seconds = choice.seconds;
-    }
-    if (frames->count() > 0) {
-      choice.options.frames = choice.frames;
-    }
-    code = render_command(choice.options, choice.is_quiet);
-  });
 }
 
 }  // namespace ressort::command_line

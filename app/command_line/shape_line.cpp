@@ -4,6 +4,7 @@
 
 #include "app/command_line/command_lines.h"
 #include "app/command_line/options.h"
+#include "app/commands/commands.h"
 #include "app/session/timbre/shape.h"
 #include "core/model/language/expression.h"
 
@@ -23,40 +24,40 @@ const char* const shape_examples =
     "  ressort shape my.mdl --f0 220 --inharmonicity 0.02 -o stiff.toml\n"
     "  ressort shape PolyTriangle --like bell.wav -o like_a_bell.toml\n";
 
-const char* help_of(TargetFigure figure) {
-  switch (figure) {
-    case TargetFigure::f0:
-      return "lowest audible mode in Hz, of models without keys";
-    case TargetFigure::t60:
-      return "T60 of the pitch in s: short or long";
-    case TargetFigure::centroid:
-      return "spectral centroid in Hz: dark or bright";
-    case TargetFigure::spread:
-      return "spectral spread in Hz: narrow or wide";
-    case TargetFigure::inharmonicity:
-      return "inharmonicity: harmonic or bell-like";
-    case TargetFigure::odd_to_even:
-      return "energy ratio of odd to even partials: full or hollow";
-    case TargetFigure::rolloff:
-      return "frequency below which 95 % of the energy is, in Hz";
-    case TargetFigure::skewness:
-      return "spectral skewness";
-    case TargetFigure::kurtosis:
-      return "spectral kurtosis: flat or peaked; 3 for a normal curve";
-    case TargetFigure::slope:
-      return "slope of the regression line of the spectrum, in 1/Hz";
-    case TargetFigure::attack:
-      return "attack time in ms: sudden or slow";
-  }
-  return "";
-}
+const char* const help_of[target_figure_count] = {
+    // [TargetFigure]
+    "lowest audible mode in Hz, of models without keys",
+    "T60 of the pitch in s: short or long",
+    "spectral centroid in Hz: dark or bright",
+    "spectral spread in Hz: narrow or wide",
+    "inharmonicity: harmonic or bell-like",
+    "energy ratio of odd to even partials: full or hollow",
+    "frequency below which 95 % of the energy is, in Hz",
+    "spectral skewness",
+    "spectral kurtosis: flat or peaked; 3 for a normal curve",
+    "slope of the regression line of the spectrum, in 1/Hz",
+    "attack time in ms: sudden or slow",
+};
 
 }  // namespace
 
-void add_shape(CLI::App& app, ShapeOptions& options, int& code) {
+void add_shape(CLI::App& app, int& code) {
   CLI::App* command =
       app.add_subcommand("shape", "adjusts a linear model's parameters to reach a target timbre");
   command->footer(shape_examples);
+  ShapeOptions& options = run_with<ShapeOptions>(*command, code, [command](const auto& chosen) {
+    for (std::string word : command->remaining()) {
+      if (word.starts_with("--")) {
+        std::replace(word.begin() + 2, word.end(), '-', '_');
+        throw CLI::ValidationError("shape", parse_target_figure(word.substr(2)).error().message);
+      }
+    }
+    if (!command->remaining().empty()) {
+      throw CLI::ValidationError(
+          "shape", "expected one model, found '" + command->remaining().front() + "' as well");
+    }
+    return shape_command(chosen);
+  });
   add_model(*command, options.name, "preset or model, by name or file")->required();
   add_output(*command, options.output, "preset to write, a .toml file");
   add_overwrite(*command, options.force);
@@ -76,7 +77,7 @@ void add_shape(CLI::App& app, ShapeOptions& options, int& code) {
               }
               options.targets.push_back({figure, value});
             },
-            help_of(row.figure))
+            help_of[static_cast<std::size_t>(row.figure)])
         ->type_name("NUMBER");
   }
   command->add_option("--like", options.like, "sound file whose loudest frame gives all targets")
@@ -90,19 +91,6 @@ void add_shape(CLI::App& app, ShapeOptions& options, int& code) {
       ->check(within(8000.0, 768000.0));
   add_motion(*command, options.third);
   command->allow_extras();
-  command->callback([command, &options, &code] {
-    for (std::string word : command->remaining()) {
-      if (word.starts_with("--")) {
-        std::replace(word.begin() + 2, word.end(), '-', '_');
-        throw CLI::ValidationError("shape", parse_target_figure(word.substr(2)).error().message);
-      }
-    }
-    if (!command->remaining().empty()) {
-      throw CLI::ValidationError(
-          "shape", "expected one model, found '" + command->remaining().front() + "' as well");
-    }
-    code = shape_command(options);
-  });
 }
 
 }  // namespace ressort::command_line

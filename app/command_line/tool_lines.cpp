@@ -5,6 +5,11 @@
 #include "app/command_line/command_lines.h"
 #include "app/command_line/manual.h"
 #include "app/command_line/options.h"
+#include "app/commands/chart/chart.h"
+#include "app/commands/check.h"
+#include "app/commands/export.h"
+#include "app/commands/make.h"
+#include "app/commands/modes/modes.h"
 #include "app/commands/reference.h"
 #include "core/model/language/expression.h"
 
@@ -90,10 +95,11 @@ DecayPoint decay_point(const std::string& text) {
 
 }  // namespace
 
-void add_check(CLI::App& app, CheckOptions& options, int& code) {
+void add_check(CLI::App& app, int& code) {
   CLI::App* command =
       app.add_subcommand("check", "checks a model or a preset for errors and stability");
   command->footer(check_examples);
+  CheckOptions& options = run_with<CheckOptions>(*command, code, check);
   add_model(*command, options.name, "preset or model, by name or file")->required();
   CLI::Option* json = command->add_flag_callback(
       "--json", [&options] { options.as = CheckAs::json; }, "print JSON, errors included");
@@ -106,16 +112,14 @@ void add_check(CLI::App& app, CheckOptions& options, int& code) {
   add_method(*command, options.method);
   add_budget(*command, options.budget);
   add_strict(*command, options.is_strict);
-  command->callback([&options, &code] { code = check(options); });
 }
 
-void add_make(CLI::App& app, MakeChoice& choice, int& code) {
-  MakeOptions& options = choice.options;
-  std::vector<std::uint32_t>& sizes = choice.sizes;
-  Shape& shape = options.shape;
+void add_make(CLI::App& app, int& code) {
   CLI::App* command =
       app.add_subcommand("make", "generates a model: a string, a mesh, a triangle or a hexagon");
   command->footer(make_examples);
+  MakeOptions& options = run_with<MakeOptions>(*command, code, make);
+  Shape& shape = options.shape;
   add_choice<ShapeKind>(*command, "KIND", shape.kind,
                         {{"string", ShapeKind::string},
                          {"stiffString", ShapeKind::stiff_string},
@@ -127,7 +131,16 @@ void add_make(CLI::App& app, MakeChoice& choice, int& code) {
                          {"hexagon", ShapeKind::hexagon}},
                         "shape")
       ->required();
-  command->add_option("N", sizes, "size; two of a mesh")->required()->expected(1, 2);
+  command
+      ->add_option_function<std::vector<std::uint32_t>>(
+          "N",
+          [&shape](const std::vector<std::uint32_t>& sizes) {
+            shape.length = sizes[0];
+            shape.width = sizes.size() > 1 ? sizes[1] : 0;
+          },
+          "size; two of a mesh")
+      ->required()
+      ->expected(1, 2);
   command->add_option("--name", shape.name, "prefix of all labels: NAME_m0, NAME_K")
       ->capture_default_str();
   command->add_option("-M,--mass", shape.mass, "mass of every point, above 0")
@@ -153,16 +166,12 @@ void add_make(CLI::App& app, MakeChoice& choice, int& code) {
       "omit the force input @in1 and the output @out1");
   add_output(*command, options.output, "output file (default: print)");
   add_overwrite(*command, options.force);
-  command->callback([&options, &sizes, &code] {
-    options.shape.length = sizes[0];
-    options.shape.width = sizes.size() > 1 ? sizes[1] : 0;
-    code = make(options);
-  });
 }
 
-void add_export(CLI::App& app, ExportOptions& options, int& code) {
+void add_export(CLI::App& app, int& code) {
   CLI::App* command = app.add_subcommand("export", "exports a model to FAUST");
   command->footer(export_examples);
+  ExportOptions& options = run_with<ExportOptions>(*command, code, export_to_faust);
   add_model(*command, options.name, "preset or model, by name or file")->required();
   command
       ->add_option_function<std::string>(
@@ -173,13 +182,13 @@ void add_export(CLI::App& app, ExportOptions& options, int& code) {
   add_overwrite(*command, options.force);
   add_no_rescale(*command, options.rescale);
   add_motion(*command, options.third);
-  command->callback([&options, &code] { code = export_to_faust(options); });
 }
 
-void add_modes(CLI::App& app, ModesOptions& options, int& code) {
+void add_modes(CLI::App& app, int& code) {
   CLI::App* command =
       app.add_subcommand("modes", "computes frequency, decay, level and shape of a model's modes");
   command->footer(modes_examples);
+  ModesOptions& options = run_with<ModesOptions>(*command, code, modes_command);
   add_model(*command, options.name, "preset or model, by name or file")->required();
   command
       ->add_option("--modes", options.count,
@@ -208,22 +217,21 @@ void add_modes(CLI::App& app, ModesOptions& options, int& code) {
       ->delimiter(',');
   add_overwrite(*command, options.force);
   add_motion(*command, options.third);
-  command->callback([&options, &code] { code = modes_command(options); });
 }
 
-void add_chart(CLI::App& app, ChartOptions& options, int& code) {
+void add_chart(CLI::App& app, int& code) {
   CLI::App* command = app.add_subcommand("chart", "plots the cost and the error of every method");
   command->footer(chart_examples);
+  ChartOptions& options = run_with<ChartOptions>(*command, code, chart);
   command->add_option("MODEL", options.scenes, "reference scenes, presets or models")
       ->type_name("NAME");
   command->add_option("-o,--output", options.folder, "output folder")->type_name("DIR")->required();
   command->add_option("-t,--time", options.patience_s, "time for timing each scene, in s")
       ->check(within(0.1, 3600.0))
       ->capture_default_str();
-  command->callback([&options, &code] { code = chart(options); });
 }
 
-void add_reference(CLI::App& app, std::string& part, int& code) {
+void add_reference(CLI::App& app, int& code) {
   CLI::App* command = app.add_subcommand("reference", "prints a table of the manual");
   std::vector<std::string> names;
   std::string footer = "PART:";
@@ -237,16 +245,16 @@ void add_reference(CLI::App& app, std::string& part, int& code) {
       "  names       the names of all presets and models";
   command->footer(footer);
   names.insert(names.end(), {"man", "completion", "names"});
+  std::string& part = run_with<std::string>(*command, code, [&app](const std::string& word) {
+    return word == "man"          ? print_man(app)
+           : word == "completion" ? print_completion(app)
+           : word == "names"      ? print_names()
+                                  : reference(word);
+  });
   command->add_option("PART", part, "table to print")
       ->type_name("WORD")
       ->required()
       ->check(CLI::IsMember(names).description(""));
-  command->callback([&app, &part, &code] {
-    code = part == "man"          ? print_man(app)
-           : part == "completion" ? print_completion(app)
-           : part == "names"      ? print_names()
-                                  : reference(part);
-  });
 }
 
 }  // namespace ressort::command_line
