@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "core/analysis/linear.h"
@@ -123,16 +122,6 @@ class ContinuousBody {
     return bar;
   }
 
-  std::vector<double> masses_of(const Vector& rows) const {
-    std::vector<double> all(row_.size(), 0.0);
-    for (std::size_t i = 0; i < row_.size(); ++i) {
-      if (row_[i] != held) {
-        all[i] = rows[row_[i]] / root_[row_[i]];
-      }
-    }
-    return all;
-  }
-
  private:
   static constexpr std::size_t held = static_cast<std::size_t>(-1);
 
@@ -161,13 +150,12 @@ class Solver {
   Solver(const Network& network, const ContinuousBody& body) : body_(body) {
     for (const Output& output : network.outputs) {
       reading_.push_back(body.reading(output));
-      made_.outputs.push_back({.rest = -reading_.back().offset});
+      outputs_.push_back({.rest = -reading_.back().offset});
     }
     std::tie(x_, v_) = body.start();
-    made_.energy = 0.5 * dot(v_, v_);
   }
 
-  std::optional<Continuous> solve() {
+  std::optional<std::vector<ContinuousOutput>> solve() {
     const Matrix k = body_.matrix(&Bar::k);
     const Matrix z = body_.matrix(&Bar::z);
     const double k_scale = std::max(largest(k.values), 1e-300);
@@ -184,18 +172,14 @@ class Solver {
       }
       return largest(rest.values) <= shared_tolerance * scale;
     };
-    made_.is_proportional = is_diagonal(k, k_scale) && is_diagonal(z, z_scale);
-    if (made_.is_proportional) {
-      Vector rest(body_.size());
+    if (is_diagonal(k, k_scale) && is_diagonal(z, z_scale)) {
       for (std::size_t j = 0; j < shapes.columns(); ++j) {
-        add_mode(shapes.column(j), k_scale, z_scale, rest);
+        add_mode(shapes.column(j), k_scale, z_scale);
       }
-      made_.rest = body_.masses_of(rest);
     } else if (body_.size() > most_crossed_modes || !add_crossed_modes(k, z)) {
       return std::nullopt;
     }
-    rank();
-    return std::move(made_);
+    return std::move(outputs_);
   }
 
  private:
@@ -208,7 +192,7 @@ class Solver {
   }
 
   // Solves q'' + damping q' + stiffness q = force for an independent mode.
-  void add_mode(const Vector& shape, double k_scale, double z_scale, Vector& rest) {
+  void add_mode(const Vector& shape, double k_scale, double z_scale) {
     double stiffness = body_.along(&Bar::k, shape);
     double damping = body_.along(&Bar::z, shape);
     stiffness = stiffness < zero * k_scale ? 0.0 : stiffness;
@@ -217,14 +201,11 @@ class Solver {
     const double q = dot(shape, x_);
     const double v = dot(shape, v_);
     if (stiffness == 0.0) {
-      add_free(shape, damping, force, q, v);
-      rest += q * shape;
-      return;
+      return add_free(shape, damping, force, q, v);
     }
     const double still = force / stiffness;
-    rest += still * shape;
     for (std::size_t o = 0; o < reading_.size(); ++o) {
-      made_.outputs[o].rest += read(o, shape) * still;
+      outputs_[o].rest += read(o, shape) * still;
     }
     double inner = stiffness - 0.25 * damping * damping;
     if (std::fabs(inner) < 1e-12 * stiffness) {
@@ -234,10 +215,7 @@ class Solver {
     const Complex pole(Complex(-0.5 * damping) + Complex(0.0, 1.0) * omega);
     if (inner > 0.0) {
       const Complex amplitude(q - still, -(v + 0.5 * damping * (q - still)) / omega.real());
-      add_terms(shape, {{amplitude, pole}});
-      made_.modes.push_back({.pole = pole, .shape = body_.masses_of(shape)});
-      keep_amplitude(shape, amplitude);
-      return;
+      return add_terms(shape, {{amplitude, pole}});
     }
     const double slow = -stiffness / (0.5 * damping + omega.imag());  // Avoids cancellation.
     const double fast = -0.5 * damping - omega.imag();
@@ -247,7 +225,7 @@ class Solver {
 
   void add_free(const Vector& shape, double damping, double force, double q, double v) {
     for (std::size_t o = 0; o < reading_.size(); ++o) {
-      ContinuousOutput& output = made_.outputs[o];
+      ContinuousOutput& output = outputs_[o];
       const double share = read(o, shape);
       if (damping == 0.0) {
         output.rest += share * q;
@@ -265,15 +243,8 @@ class Solver {
   void add_terms(const Vector& shape, const std::vector<ContinuousOutput::Term>& terms) {
     for (std::size_t o = 0; o < reading_.size(); ++o) {
       for (const ContinuousOutput::Term& term : terms) {
-        made_.outputs[o].terms.push_back({read(o, shape) * term.amplitude, term.pole});
+        outputs_[o].terms.push_back({read(o, shape) * term.amplitude, term.pole});
       }
-    }
-  }
-
-  void keep_amplitude(const Vector& shape, Complex amplitude) {
-    amplitudes_.emplace_back();
-    for (std::size_t o = 0; o < reading_.size(); ++o) {
-      amplitudes_.back().push_back(std::abs(amplitude * read(o, shape)));
     }
   }
 
@@ -292,7 +263,6 @@ class Solver {
     if (!still) {
       return false;
     }
-    made_.rest = body_.masses_of(*still);
     Vector state(2 * n);
     state[std::slice(0, n, 1)] = x_ - *still;
     state[std::slice(n, n, 1)] = v_;
@@ -301,76 +271,43 @@ class Solver {
       return false;
     }
     for (std::size_t o = 0; o < reading_.size(); ++o) {
-      made_.outputs[o].rest += read(o, *still);
+      outputs_[o].rest += read(o, *still);
     }
     for (std::size_t j = 0; j < 2 * n; ++j) {
       const Complex pole = pairs->values[j];
       if (pole.imag() < 0.0) {
         continue;  // Included with its conjugate.
       }
-      const bool swings = pole.imag() > 0.0;
-      std::vector<double> loud;
+      const std::complex<double> share = pairs->shares[j] * (pole.imag() > 0.0 ? 2.0 : 1.0);
       for (std::size_t o = 0; o < reading_.size(); ++o) {
         Complex amplitude = 0.0;
         for (const auto& [row, part] : reading_[o].shares) {
-          amplitude += part * pairs->vectors[j][row] * pairs->shares[j] * (swings ? 2.0 : 1.0);
+          amplitude += part * pairs->vectors[j][row] * share;
         }
-        made_.outputs[o].terms.push_back({amplitude, pole});
-        loud.push_back(std::abs(amplitude));
-      }
-      if (swings) {
-        made_.modes.push_back({.pole = pole});
-        amplitudes_.push_back(std::move(loud));
+        outputs_[o].terms.push_back({amplitude, pole});
       }
     }
     return true;
-  }
-
-  // Computes the loudness relative to the loudest at each output, and sorts by frequency.
-  void rank() {
-    for (std::size_t o = 0; o < reading_.size(); ++o) {
-      double loudest = 0.0;
-      for (const auto& amplitude : amplitudes_) {
-        loudest = std::max(loudest, amplitude[o]);
-      }
-      for (std::size_t j = 0; loudest > 0.0 && j < amplitudes_.size(); ++j) {
-        made_.modes[j].loudness = std::max(made_.modes[j].loudness, amplitudes_[j][o] / loudest);
-      }
-    }
-    std::sort(made_.modes.begin(), made_.modes.end(),
-              [](const ContinuousMode& a, const ContinuousMode& b) {
-                return a.pole.imag() < b.pole.imag();
-              });
   }
 
   const ContinuousBody& body_;
   std::vector<Bar> reading_;  // [output]
   Vector x_;                  // [row] Position at the start.
   Vector v_;
-  Continuous made_;
-  std::vector<std::vector<double>> amplitudes_;  // [mode][output]
+  std::vector<ContinuousOutput> outputs_;
 };
 
 }  // namespace
 
-double ContinuousMode::frequency_hz() const {
-  return pole.imag() * Network::reference_rate_hz / (2.0 * std::numbers::pi);
-}
-
-double ContinuousMode::t60_s() const {
-  return 3.0 * std::numbers::ln10 / -pole.real() / Network::reference_rate_hz;
-}
-
-std::vector<double> Continuous::play(std::size_t output, std::size_t frames, double step) const {
+std::vector<double> ContinuousOutput::play(std::size_t frames, double step) const {
   // Number of products after which e^(pole t) is computed again, to limit rounding errors.
   constexpr std::size_t anew = 256;
-  const ContinuousOutput& heard = outputs[output];
   std::vector<double> sound(frames);
   for (std::size_t n = 0; n < frames; ++n) {
     const double t = step * static_cast<double>(n + 1);
-    sound[n] = heard.rest + t * (heard.drift + 0.5 * t * heard.fall);
+    sound[n] = rest + t * (drift + 0.5 * t * fall);
   }
-  for (const ContinuousOutput::Term& term : heard.terms) {
+  for (const Term& term : terms) {
     const std::complex<double> turn = std::exp(term.pole * step);
     std::complex<double> value;
     for (std::size_t n = 0; n < frames; ++n) {
@@ -383,8 +320,8 @@ std::vector<double> Continuous::play(std::size_t output, std::size_t frames, dou
   return sound;
 }
 
-std::optional<Continuous> solve_continuous(const Network& network,
-                                           std::span<const double> parameters) {
+std::optional<std::vector<ContinuousOutput>> solve_continuous(const Network& network,
+                                                              std::span<const double> parameters) {
   if (!network.macros.empty()) {
     return solve_continuous(expand_macros(network), parameters);
   }

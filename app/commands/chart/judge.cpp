@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "app/commands/chart/reference_scheme.h"
 #include "core/analysis/continuous.h"
 #include "core/compile/machine.h"
+#include "core/engine/energy.h"
 
 namespace ressort::commands {
 namespace {
@@ -50,66 +52,27 @@ double peak_of(const Waves& waves) {
   return peak;
 }
 
-// Keeps the first and the highest energy.
-class EnergyMeter {
- public:
-  void add(const StoredEnergy& energy) {
-    if (!has_begun_) {
-      reading_.first = energy.total;
-    }
-    has_begun_ = true;
-    // NaN counts as the highest.
-    if (energy.held == 0.0 && !(energy.total <= highest_)) {
-      highest_ = std::isfinite(energy.total) ? energy.total : HUGE_VAL;
-    }
-    held_ = std::max(held_, energy.total);
-  }
-  EnergyReading reading() const {
-    return {reading_.first, highest_ > -HUGE_VAL ? highest_ : held_};
-  }
-
- private:
-  EnergyReading reading_;
-  bool has_begun_ = false;
-  double highest_ = -HUGE_VAL;  // while contacts and plucks store no energy
-  double held_ = -HUGE_VAL;     // highest value at any time
-};
-
-// The inputs of one part, sample by sample.
-class PartInputs {
- public:
-  PartInputs(const ChartScene& scene, const Machine& machine, const Program& program)
-      : value(program.inputs.size()), velocity(value.size()) {
-    for (const InputSlot& input : program.inputs) {
-      motion_.push_back(scene.motions[input.input]);
-      rest_.push_back(machine.inputs[input.input].position);
-    }
-    move_to(0.0);
-  }
-  void move_to(double seconds) {
-    for (std::size_t i = 0; i < value.size(); ++i) {
-      const double next = motion_[i] ? motion_[i](seconds) : rest_[i];
-      velocity[i] = next - value[i];
-      value[i] = next;
-    }
-  }
-  std::vector<double> value;
-  std::vector<double> velocity;
-
- private:
-  std::vector<InputMotion> motion_;
-  std::vector<double> rest_;
-};
-
 Waves published_waves(const ChartScene& scene) {
   const Machine machine = make_machine(scene.network, scene_rate_hz, true);
   Waves waves(machine.channels, std::vector<double>(frames_of(heard_s)));
+  const auto position_of = [&](const InputSlot& slot, std::size_t n) {
+    const InputMotion& motion = scene.motions[slot.input];
+    return motion ? motion(static_cast<double>(n) / scene_rate_hz)
+                  : machine.inputs[slot.input].position;
+  };
   for (const Program& program : machine.parts) {
-    PartInputs inputs(scene, machine, program);
+    std::vector<double> value;
+    for (const InputSlot& slot : program.inputs) {
+      value.push_back(position_of(slot, 0));
+    }
+    std::vector<double> velocity(value.size());
     ReferenceScheme scheme(program);
     for (std::size_t n = 0; n < waves[0].size(); ++n) {
-      inputs.move_to(static_cast<double>(n + 1) / scene_rate_hz);
-      scheme.step(inputs.value, inputs.velocity);
+      for (std::size_t i = 0; i < value.size(); ++i) {
+        const double next = position_of(program.inputs[i], n + 1);
+        velocity[i] = next - std::exchange(value[i], next);
+      }
+      scheme.step(value, velocity);
       const std::vector<double> outputs = scheme.outputs();
       for (std::size_t i = 0; i < outputs.size(); ++i) {
         waves[program.outputs[i].channel][n] += outputs[i];
@@ -119,12 +82,12 @@ Waves published_waves(const ChartScene& scene) {
   return waves;
 }
 
-Waves exact_waves(const ChartScene& scene, const Continuous& continuous) {
+Waves exact_waves(const ChartScene& scene, const std::vector<ContinuousOutput>& outputs) {
   Waves waves(static_cast<std::size_t>(output_count(scene.network)),
               std::vector<double>(frames_of(heard_s)));
-  for (std::size_t o = 0; o < continuous.outputs.size(); ++o) {
+  for (std::size_t o = 0; o < outputs.size(); ++o) {
     waves[static_cast<std::size_t>(scene.network.outputs[o].number - 1)] =
-        continuous.play(o, frames_of(heard_s), 1.0);
+        outputs[o].play(frames_of(heard_s), 1.0);
   }
   return waves;
 }
@@ -179,54 +142,46 @@ Waves render_way(MadeWay& way, std::size_t frames) {
   return waves;
 }
 
-std::optional<EnergyReading> watch_energy(const ChartScene& scene, MadeWay& way, double seconds) {
+std::optional<EnergyReading> watch_energy(MadeWay& way, double seconds) {
   if (way.methods.find(method_name(Method::oversampled)) != std::string::npos) {
     return std::nullopt;  // its velocities are those of the last of several steps
   }
-  const Machine machine = make_machine(scene.network, scene_rate_hz, true);
-  std::vector<const Program*> programs;
-  for (const Program& program : machine.parts) {
-    if (program.moving > 0) {
-      programs.push_back(&program);
+  const std::vector<Program>& parts = way.machine().parts;
+  std::vector<std::vector<double>> coefficients;  // [part]
+  for (const Program& program : parts) {
+    coefficients.emplace_back();
+    for (const Coefficient& one : program.coefficients) {
+      coefficients.back().push_back(coefficient_value(program, one, program.parameters, 1.0));
     }
   }
-  States x(programs.size());
-  States v(programs.size());
-  States next_x(programs.size());
-  States next_v(programs.size());
   const unsigned times = way.way.oversampling;
-  EnergyMeter meter;
+  EnergyReading reading{.highest = -HUGE_VAL};
+  States x;
+  States v;
   way.player->rewind();
-  way.player->play(1, nullptr);
-  if (!way.player->save(x, v) || x.size() != programs.size()) {
-    return std::nullopt;
-  }
   for (std::size_t n = 0; n < frames_of(seconds); ++n) {
-    way.player->play(1, nullptr);
-    way.player->save(next_x, next_v);
-    StoredEnergy energy;
-    for (std::size_t i = 0; i < programs.size(); ++i) {
-      if (x[i].size() != programs[i]->position.size()) {
-        return std::nullopt;  // the kernel steps different nodes
-      }
-      for (std::size_t node = 0; node < x[i].size(); ++node) {
-        v[i][node] *= times;
-        next_v[i][node] *= times;
-      }
-      const StoredEnergy more = stored_energy(*programs[i], x[i], v[i], next_v[i]);
-      energy.total += more.total;
-      energy.held += more.held;
+    way.player->play(times, nullptr);
+    if (!way.player->save(x, v)) {
+      return std::nullopt;
     }
-    meter.add(energy);
-    if (times > 1) {
-      way.player->play(times - 1, nullptr);
-      way.player->save(x, v);
-    } else {
-      std::swap(x, next_x);
-      std::swap(v, next_v);
+    Energy all;
+    std::size_t moving = 0;
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      if (parts[i].moving > 0) {
+        const Energy own = energy_of(parts[i], LaneValues<double>{coefficients[i].data()},
+                                     x[moving].data(), v[moving].data());
+        all.value += times * times * own.value;
+        all.uncertainty += times * times * own.uncertainty;
+        ++moving;
+      }
+    }
+    reading.first = n == 0 ? all.value + all.uncertainty : reading.first;
+    // NaN counts as the highest.
+    if (const double least = all.value - all.uncertainty; !(least <= reading.highest)) {
+      reading.highest = std::isfinite(least) ? least : HUGE_VAL;
     }
   }
-  return meter.reading();
+  return reading;
 }
 
 std::array<double, 2> References::snr_db(const Waves& found) const {
@@ -280,7 +235,7 @@ Stress::Stress(const ChartScene& scene, Isa isa) : isa_(isa) {
     const double seconds = stress_length_s(one.scene);
     if (auto fine = make_way(one.scene, direct_at(stress_times), seconds, isa_)) {
       one.peak = peak_of(render_way(*fine, frames_of(seconds)));
-      const auto energy = watch_energy(one.scene, *fine, seconds);
+      const auto energy = watch_energy(*fine, seconds);
       one.energy = energy ? energy->highest : HUGE_VAL;
     }
     // An input that moves too fast to do much work must not tighten the bounds.
@@ -300,7 +255,7 @@ std::string Stress::verdict(const Way& way) const {
     if (!(peak < runaway)) {
       return one.name + ": grows without bounds";
     }
-    const auto energy = watch_energy(one.scene, *made, seconds);
+    const auto energy = watch_energy(*made, seconds);
     if (!energy && peak > std::sqrt(stress_excess) * one.peak) {
       return one.name + ": louder than possible";
     }

@@ -39,13 +39,13 @@ Waves render_way(MadeWay& way, std::size_t frames);
 // seconds if the scene is nonlinear. Fails if the scene is too large.
 Result<References> find_references(const ChartScene& scene, const ChartScene& stepped, Isa isa);
 
-// The highest energy in `seconds`, and the energy at the start. If links can detach, only the
-// moments when all are detached count. Empty if a kernel does not know the positions of its masses.
+// The energy at the start, and the highest in `seconds`, as far as the energy of nonlinear links is
+// certain. Empty if a kernel does not know the positions of its masses.
 struct EnergyReading {
   double first = 0.0;
   double highest = 0.0;
 };
-std::optional<EnergyReading> watch_energy(const ChartScene& scene, MadeWay& way, double seconds);
+std::optional<EnergyReading> watch_energy(MadeWay& way, double seconds);
 
 // Tests methods with a scene, as written and struck ten times harder.
 class Stress {

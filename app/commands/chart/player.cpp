@@ -11,27 +11,15 @@ namespace {
 
 constexpr std::size_t most_kept = std::size_t{1} << 22;  // samples of a motion
 
-// Position of one input at every sample, computed in advance so that timing excludes it.
-class InputTrack {
- public:
-  InputTrack(InputMotion motion, double start, double rate_hz, double seconds)
-      : motion_(std::move(motion)), rate_hz_(rate_hz), start_(motion_ ? motion_(0.0) : start) {
-    const auto wanted = static_cast<std::size_t>(std::lround(seconds * rate_hz));
-    for (std::size_t n = 0; motion_ && n < std::min(wanted, most_kept); ++n) {
-      kept_.push_back(motion_(static_cast<double>(n + 1) / rate_hz_));
-    }
-  }
-  bool moves() const { return motion_ != nullptr; }
-  double start() const { return start_; }
+// An input, with its first positions computed in advance, so that timing excludes them.
+struct InputTrack {
   double at(std::size_t n) const {
-    return n < kept_.size() ? kept_[n] : motion_(static_cast<double>(n + 1) / rate_hz_);
+    return n < kept.size() ? kept[n] : motion(static_cast<double>(n + 1) / rate_hz);
   }
-
- private:
-  InputMotion motion_;
-  double rate_hz_;
-  double start_;
-  std::vector<double> kept_;
+  InputMotion motion;  // null: at rest
+  double rate_hz = 0.0;
+  double start = 0.0;
+  std::vector<double> kept = {};
 };
 
 // One part's kernel with the buffers of its inputs and outputs.
@@ -77,8 +65,13 @@ class KernelPlayer final : public ChartPlayer {
                Isa isa)
       : channels_(machine.channels) {
     for (std::size_t i = 0; i < machine.inputs.size(); ++i) {
-      tracks_.emplace_back(i < motions.size() ? motions[i] : InputMotion(),
-                           machine.inputs[i].position, machine.rate_hz, seconds);
+      const InputMotion& motion = motions[i];
+      InputTrack& track = tracks_.emplace_back(
+          InputTrack{motion, machine.rate_hz, motion ? motion(0.0) : machine.inputs[i].position});
+      const auto wanted = static_cast<std::size_t>(std::lround(seconds * machine.rate_hz));
+      for (std::size_t n = 0; motion && n < std::min(wanted, most_kept); ++n) {
+        track.kept.push_back(motion(static_cast<double>(n + 1) / machine.rate_hz));
+      }
     }
     parts_.reserve(machine.parts.size());
     for (const Program& program : machine.parts) {
@@ -99,9 +92,9 @@ class KernelPlayer final : public ChartPlayer {
     for (PlayedPart<T>& part : parts_) {
       for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {
         const InputTrack& track = tracks_[part.program.inputs[i].input];
-        part.before[i] = track.start();
+        part.before[i] = track.start;
         for (std::size_t n = 0; n < max_block_frames; ++n) {
-          part.feed(n, i, track.start(), 0.0);
+          part.feed(n, i, track.start, 0.0);
         }
       }
     }
@@ -147,7 +140,7 @@ class KernelPlayer final : public ChartPlayer {
   void feed(PlayedPart<T>& part, std::size_t count) {
     for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {
       const InputTrack& track = tracks_[part.program.inputs[i].input];
-      for (std::size_t n = 0; track.moves() && n < count; ++n) {
+      for (std::size_t n = 0; track.motion && n < count; ++n) {
         const double x = track.at(frame_ + n);
         part.feed(n, i, x, x - part.before[i]);
         part.before[i] = x;

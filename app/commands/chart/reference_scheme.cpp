@@ -1,8 +1,6 @@
 #include "app/commands/chart/reference_scheme.h"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 
 #include "core/laws/laws.h"
 
@@ -12,31 +10,14 @@ struct ressort::ScalarOf<long double> {
 };
 
 namespace ressort::commands {
-namespace {
-
-std::vector<double> coefficients_of(const Program& program) {
-  std::vector<double> values;
-  for (const Coefficient& coefficient : program.coefficients) {
-    values.push_back(coefficient_value(program, coefficient, program.parameters, 1.0));
-  }
-  return values;
-}
-
-template <class T>
-std::vector<double> narrowed(const std::vector<T>& wide) {
-  return {wide.begin(), wide.end()};
-}
-
-}  // namespace
-
 ReferenceScheme::ReferenceScheme(const Program& program)
     : program_(program),
       x_(program.position.begin(), program.position.end()),
       v_(program.velocity.begin(), program.velocity.end()),
       force_(x_.size()),
       pushed_(x_.size()) {
-  for (const double value : coefficients_of(program)) {
-    coefficient_.push_back(value);
+  for (const Coefficient& one : program.coefficients) {
+    coefficient_.push_back(coefficient_value(program, one, program.parameters, 1.0));
   }
   for (const TapSlot& tap : program.taps) {
     corners_.push_back(corners_at<Real>(tap, coefficient_[tap.u], coefficient_[tap.v]));
@@ -133,38 +114,6 @@ std::vector<double> ReferenceScheme::outputs() const {
     values.push_back(static_cast<double>(value));
   }
   return values;
-}
-
-std::vector<double> ReferenceScheme::positions() const {
-  return narrowed(x_);
-}
-std::vector<double> ReferenceScheme::velocities() const {
-  return narrowed(v_);
-}
-
-StoredEnergy stored_energy(const Program& program, std::span<const double> x,
-                           std::span<const double> v_before, std::span<const double> v_after) {
-  const std::vector<double> coefficient = coefficients_of(program);
-  StoredEnergy energy;
-  for (const MassRun& run : program.mass_runs) {
-    const double inverse = coefficient[run.inverse_mass];
-    const double k = run.is_oscillator ? coefficient[run.stiffness] : 0.0;
-    const double g = run.has_gravity ? coefficient[run.gravity] : 0.0;
-    for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
-      energy.total += 0.5 * v_before[i] * v_after[i] / inverse + 0.5 * k * x[i] * x[i] + g * x[i];
-    }
-  }
-  for (const LinkRun& run : program.link_runs) {
-    const auto c = [&](std::size_t i) { return coefficient[run.coefficients[i]]; };
-    with_law<double>(run.law, c, [&](const auto& law) {
-      for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
-        const double held = law.potential(x[program.ends[i].a] - x[program.ends[i].b]);
-        energy.total += held;
-        energy.held += law.facts.can_detach() ? held : 0.0;
-      }
-    });
-  }
-  return energy;
 }
 
 }  // namespace ressort::commands

@@ -1,5 +1,5 @@
 // app/commands/chart: the published scheme in long double, link by link. It is the reference that
-// kernels are compared with. Also the energy stored in masses and links.
+// kernels are compared with.
 #pragma once
 
 #include <span>
@@ -22,9 +22,7 @@ class ReferenceScheme {
   // positions since the last sample.
   void step(std::span<const double> value, std::span<const double> velocity);
 
-  std::vector<double> outputs() const;    // [output slot]
-  std::vector<double> positions() const;  // [node]
-  std::vector<double> velocities() const;
+  std::vector<double> outputs() const;  // [output slot]
 
  private:
   using Real = long double;
@@ -43,17 +41,5 @@ class ReferenceScheme {
   std::vector<Real> pushed_;            // [node] of the inputs, in this sample
   std::vector<Corners<Real>> corners_;  // [tap]
 };
-
-struct StoredEnergy {
-  double total = 0.0;
-  double held = 0.0;  // the part in contacts and plucks
-};
-
-// Returns the energy of a Program's masses and links at x, between two velocities, all [node]:
-//   1/2 sum(M v_before v_after) + sum of every link's potential at x
-// This product of successive velocities is the invariant of the Störmer-Verlet scheme for undamped
-// springs. Bows and dampers store nothing.
-StoredEnergy stored_energy(const Program& program, std::span<const double> x,
-                           std::span<const double> v_before, std::span<const double> v_after);
 
 }  // namespace ressort::commands

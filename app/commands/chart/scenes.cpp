@@ -4,7 +4,6 @@
 #include <bit>
 #include <cctype>
 #include <cmath>
-#include <set>
 
 #include "core/analysis/continuous.h"
 #include "core/analysis/linear.h"
@@ -161,18 +160,26 @@ bool is_still(const Network& network) {
   });
 }
 
-void strike_first_mass(ChartScene& scene) {
-  Network& network = scene.network;
+// Returns the moving masses that the inputs drive, or else the first mass that moves.
+std::vector<std::uint32_t> struck_masses(const Network& network) {
+  std::vector<std::uint32_t> masses;
   for (const Input& input : network.inputs) {
     const std::uint32_t mass = struck_by(network, input);
-    if (moves(network.masses[mass])) {
-      return strike(scene, mass);
+    if (moves(network.masses[mass]) && std::ranges::find(masses, mass) == masses.end()) {
+      masses.push_back(mass);
     }
   }
-  for (std::uint32_t i = 0; i < network.masses.size(); ++i) {
+  for (std::uint32_t i = 0; i < network.masses.size() && masses.empty(); ++i) {
     if (moves(network.masses[i])) {
-      return strike(scene, i);
+      masses.push_back(i);
     }
+  }
+  return masses;
+}
+
+void strike_first_mass(ChartScene& scene) {
+  if (const auto masses = struck_masses(scene.network); !masses.empty()) {
+    strike(scene, masses[0]);
   }
 }
 
@@ -278,18 +285,13 @@ Result<ChartScene> chart_scene(const std::string& name) {
 
 ChartScene struck(const ChartScene& scene) {
   ChartScene other = scene;
-  std::set<std::uint32_t> masses;
-  for (const Input& input : scene.network.inputs) {
-    masses.insert(struck_by(scene.network, input));
-  }
-  std::erase_if(masses, [&](std::uint32_t i) { return !moves(scene.network.masses[i]); });
-  if (masses.empty()) {
-    strike_first_mass(other);
-  }
-  for (const std::uint32_t mass : masses) {
+  for (const std::uint32_t mass : struck_masses(scene.network)) {
     strike(other, mass);
   }
-  other.about = std::string("an impulse at ") + (masses.empty() ? "the first mass" : "its inputs");
+  const bool has_inputs = std::ranges::any_of(scene.network.inputs, [&](const Input& input) {
+    return moves(scene.network.masses[struck_by(scene.network, input)]);
+  });
+  other.about = std::string("an impulse at ") + (has_inputs ? "its inputs" : "the first mass");
   return other;
 }
 
@@ -324,15 +326,15 @@ Starts::Starts(const ChartScene& scene) {
       heard.outputs.push_back({.number = static_cast<int>(heard.outputs.size()) + 1, .mass = i});
     }
   }
-  const auto course = solve_continuous(heard, parameter_values(heard));
-  for (unsigned i = 0; i < scenes_.size() && course; ++i) {
+  const auto outputs = solve_continuous(heard, parameter_values(heard));
+  for (unsigned i = 0; i < scenes_.size() && outputs; ++i) {
     const double steps = 1U << i;
     Network& network = scenes_[i].network;
     for (std::size_t o = 0; o < heard.outputs.size(); ++o) {
       Mass& mass = network.masses[heard.outputs[o].mass];
       // No link exerts a force in the first step. The initial velocity makes this step end at the
       // position of the continuous network.
-      const double way = steps * (course->play(o, 1, 1.0 / steps)[0] - mass.position);
+      const double way = steps * ((*outputs)[o].play(1, 1.0 / steps)[0] - mass.position);
       mass.third = network.third == ThirdArgument::delayed_position
                        ? mass.position - way
                        : way * Network::reference_rate_hz;
