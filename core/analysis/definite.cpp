@@ -4,8 +4,8 @@
 #include <cassert>
 #include <limits>
 #include <map>
-#include <numeric>
 
+#include "core/groups.h"
 #include "core/linear_algebra/cholesky.h"
 
 namespace ressort::analysis {
@@ -143,29 +143,22 @@ Definite::Wandering Definite::test_moving_ends(std::span<const double> diagonal,
 
 void Definite::find_parts() {
   constexpr std::uint32_t no_row = 0xffffffffu;
-  part_.resize(assembly_.masses.size());
-  std::iota(part_.begin(), part_.end(), 0u);
-  const auto find = [&](std::uint32_t row) {
-    while (part_[row] != row) {
-      row = part_[row] = part_[part_[row]];
-    }
-    return row;
-  };
+  Groups parts(assembly_.masses.size());
   // A moving end stays on one part, at whichever of its nodes it is.
   std::vector<std::uint32_t> first(assembly_.wandering_ends, no_row);
   for (const Assembly::Term& term : assembly_.terms) {
     const auto entries = assembly_.of(term);
-    for (std::size_t i = 1; i < entries.size(); ++i) {
-      part_[find(entries[i].row)] = find(entries[0].row);
+    for (const Assembly::Entry& entry : entries) {
+      parts.join(entry.row, entries[0].row);
     }
     if (term.wanders > 0) {
       std::uint32_t& row = first[term.wanders - 1];
       row = row == no_row ? entries[0].row : row;
-      part_[find(entries[0].row)] = find(row);
+      parts.join(entries[0].row, row);
     }
   }
-  for (std::uint32_t row = 0; row < part_.size(); ++row) {
-    part_[row] = find(row);
+  for (std::uint32_t row = 0; row < assembly_.masses.size(); ++row) {
+    part_.push_back(parts.find(row));
   }
 }
 

@@ -48,21 +48,9 @@ class MeterReader {
   struct Trial {
     Place place;
     TargetValues figures;
-    std::vector<double> noticed;  // [target] In JND.
-    double cost() const {
-      double sum = 0.0;
-      for (const double one : noticed) {
-        sum += one * one;
-      }
-      return sum;
-    }
-    double worst() const {
-      double most = 0.0;
-      for (const double one : noticed) {
-        most = std::max(most, std::fabs(one));
-      }
-      return most;
-    }
+    Vector noticed;  // [target] In JND.
+    double cost() const { return dot(noticed, noticed); }
+    double worst() const { return largest(noticed); }
     bool is_there() const { return worst() <= unnoticed; }
   };
 
@@ -99,8 +87,9 @@ class MeterReader {
       error = found.error();
       return std::nullopt;
     }
-    Trial trial{place, *found, {}};
-    for (const TimbreTarget& target : targets_) {
+    Trial trial{place, *found, Vector(targets_.size())};
+    for (std::size_t t = 0; t < targets_.size(); ++t) {
+      const TimbreTarget& target = targets_[t];
       const auto value = (*found)[static_cast<std::size_t>(target.figure)];
       const double noticed = value ? jnd_between(target.figure, *value, target.value)
                                    : std::numeric_limits<double>::quiet_NaN();
@@ -108,7 +97,7 @@ class MeterReader {
         error = Error{"the sound has no " + std::string(row_of(target.figure).name) + " there"};
         return std::nullopt;
       }
-      trial.noticed.push_back(noticed);
+      trial.noticed[t] = noticed;
     }
     return trial;
   }
@@ -126,9 +115,8 @@ class MeterReader {
           continue;
         }
         if (const auto there = trial(place)) {
-          for (std::size_t t = 0; t < targets_.size(); ++t) {
-            slopes(t, i) = (there->noticed[t] - at.noticed[t]) / moved;
-          }
+          slopes.values[std::slice(i * targets_.size(), targets_.size(), 1)] =
+              Vector((there->noticed - at.noticed) / moved);
           break;
         }
       }
@@ -144,9 +132,7 @@ class MeterReader {
   Descent descent(const Trial& at, Matrix slopes) const {
     Descent down{Vector(free_.size()), std::vector<bool>(free_.size()), std::move(slopes)};
     for (std::size_t i = 0; i < free_.size(); ++i) {
-      for (std::size_t t = 0; t < targets_.size(); ++t) {
-        down.gradient[i] += down.slopes(t, i) * at.noticed[t];
-      }
+      down.gradient[i] = dot(down.slopes.column(i), at.noticed);
       down.is_held[i] = (at.place[i] <= 0.0 && down.gradient[i] > 0.0) ||
                         (at.place[i] >= 1.0 && down.gradient[i] < 0.0);
     }
@@ -219,14 +205,13 @@ class MeterReader {
       step[i] = to.place[i] - from.place[i];
     }
     const double square = dot(step, step);
-    for (std::size_t t = 0; t < targets_.size(); ++t) {
-      double untold = to.noticed[t] - from.noticed[t];
-      for (std::size_t i = 0; i < free_.size(); ++i) {
-        untold -= slopes(t, i) * step[i];
-      }
-      for (std::size_t i = 0; i < free_.size(); ++i) {
-        slopes(t, i) += untold * step[i] / square;
-      }
+    Vector untold = to.noticed - from.noticed;
+    for (std::size_t i = 0; i < free_.size(); ++i) {
+      untold -= slopes.column(i) * step[i];
+    }
+    for (std::size_t i = 0; i < free_.size(); ++i) {
+      slopes.values[std::slice(i * targets_.size(), targets_.size(), 1)] +=
+          Vector(untold * step[i] / square);
     }
     return slopes;
   }
@@ -248,9 +233,7 @@ class MeterReader {
     for (std::size_t a = 0; a < moving.size(); ++a) {
       back[a] = -down.gradient[moving[a]];
       for (std::size_t b = 0; b < moving.size(); ++b) {
-        for (std::size_t t = 0; t < targets_.size(); ++t) {
-          normal(a, b) += down.slopes(t, moving[a]) * down.slopes(t, moving[b]);
-        }
+        normal(a, b) = dot(down.slopes.column(moving[a]), down.slopes.column(moving[b]));
       }
       steepest = std::max(steepest, normal(a, a));
     }
@@ -399,7 +382,7 @@ class Search {
     }
     asked.values = judge_.values_at(best_->place);
     asked.reached = best_->figures;
-    asked.noticed = best_->noticed;
+    asked.noticed.assign(std::begin(best_->noticed), std::end(best_->noticed));
     asked.is_reached = best_->is_there();
     if (!asked.is_reached) {
       const auto down = judge_.descent(*best_);

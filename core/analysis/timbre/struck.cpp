@@ -277,11 +277,7 @@ std::optional<TemporalShape> StruckModel::rising(const Tuned& tuned, StruckAs ho
       }
     });
   }
-  EnvelopeTimes times(sums);
-  for (const double level : levels) {
-    times.add(level);
-  }
-  return times.shape(rate_hz);
+  return temporal_shape(levels, rate_hz);
 }
 
 std::optional<double> StruckModel::attack_ms(std::span<const double> parameters) {
