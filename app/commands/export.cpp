@@ -36,15 +36,12 @@ Result<std::string> to_faust(const Scene& scene, bool rescale, const Progress& p
 
 int export_to_faust(const ExportOptions& options) {
   if (options.output.ends_with(".mdl") || options.output.ends_with(".toml")) {
-    std::fprintf(stderr, "-o: expected a FAUST file such as NAME.dsp, found '%s'\n",
-                 options.output.c_str());
-    return exit_code::wrong_use;
+    return reject("-o: expected a FAUST file such as NAME.dsp, found '" + options.output + "'");
   }
   const Progress progress = report_stages(options.name);
   const auto scene = load_scene(options.name, {.third = options.third, .progress = progress});
   if (!scene) {
-    std::fprintf(stderr, "%s\n", scene.error().message.c_str());
-    return exit_code::wrong_use;
+    return reject(scene.error().message);
   }
   if (!scene->preset.bodies.empty()) {
     const SourceLocation at = scene->preset.through_location;
@@ -52,21 +49,18 @@ int export_to_faust(const ExportOptions& options) {
         "the models of 'through' cannot be exported with the voices; export each "
         "model by its own name and join them with ':'",
         at.line, at.column};
-    std::fprintf(stderr, "%s\n", to_string(finding_of(scene->path, "", error)).c_str());
-    return exit_code::wrong_use;
+    return reject(to_string(finding_of(scene->path, "", error)));
   }
   for (const std::string& warning : scene->warnings) {
-    std::fprintf(stderr, "%s\n", warning.c_str());
+    print_error(warning);
   }
   const std::string read[] = {scene->path, scene->model_path};
   if (auto spared = check_not_input(options.output, read); !spared) {
-    std::fprintf(stderr, "%s\n", spared.error().message.c_str());
-    return exit_code::wrong_use;
+    return reject(spared.error().message);
   }
   const auto text = to_faust(*scene, options.rescale, progress);
   if (!text) {
-    std::fprintf(stderr, "%s\n", text.error().message.c_str());
-    return exit_code::wrong_use;
+    return reject(text.error().message);
   }
   if (const std::size_t count = faust_elements(scene->network);
       count > comfortable_faust_elements) {

@@ -1,7 +1,5 @@
 #include "app/commands/offline.h"
 
-#include <time.h>
-
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -15,6 +13,7 @@
 #include "app/session/compile_scene.h"
 #include "app/session/files.h"
 #include "app/session/memory.h"
+#include "app/session/timing.h"
 #include "app/text.h"
 #include "core/compile/compile.h"
 #include "core/model/language/expression.h"
@@ -197,13 +196,6 @@ Result<std::optional<SoundReader>> open_input(const RenderOptions& options) {
     return Error{"'" + options.input + "' has no length in its header; pass --seconds"};
   }
   return std::optional<SoundReader>(*std::move(sound));
-}
-
-// CPU time of this thread.
-double thread_cpu_s() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
 // Reports a value outside the preset's range, at the line that sets it.
@@ -441,9 +433,9 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
     if (!heard) {
       return Error{"'" + options.input + "': " + heard.error().message};
     }
-    const double before_s = thread_cpu_s();
+    const double before_ns = thread_cpu_ns();
     process.block(*heard, std::span<double* const>(outputs), count, packets.next(frame, count), 0);
-    rendered.cpu_s += thread_cpu_s() - before_s;
+    rendered.cpu_s += 1e-9 * (thread_cpu_ns() - before_ns);
     double peak = 0.0;
     for (std::size_t n = 0; n < count; ++n) {
       for (std::size_t c = 0; c < channels; ++c) {

@@ -4,6 +4,7 @@
 
 #include <cerrno>
 #include <cstdio>
+#include <ctime>
 #include <filesystem>
 #include <memory>
 #include <system_error>
@@ -12,6 +13,7 @@
 #include "app/exit_code.h"
 #include "app/session/files.h"
 #include "app/session/load_progress.h"
+#include "app/version.h"
 
 namespace ressort::commands {
 
@@ -22,6 +24,16 @@ void print_error(const std::string& message) {
 int reject(const std::string& message) {
   print_error(message);
   return exit_code::wrong_use;
+}
+
+std::string made_today() {
+  const std::time_t now = std::time(nullptr);
+  char date[16] = "";
+  std::tm local{};
+  if (localtime_r(&now, &local) != nullptr) {
+    std::strftime(date, sizeof date, "%Y-%m-%d", &local);
+  }
+  return std::string("ressort ") + version + " (" + commit + "), " + date;
 }
 
 Progress report_stages(const std::string& name) {

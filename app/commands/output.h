@@ -15,6 +15,9 @@ void print_error(const std::string& message);
 // Prints an error in the arguments or the input. Returns its exit code.
 int reject(const std::string& message);
 
+// Returns the program's version and the date, for the captions of figures.
+std::string made_today();
+
 // Returns a Progress that prints the stages of slow work. It never stops: Ctrl-C ends the process.
 Progress report_stages(const std::string& name);
 

@@ -11,21 +11,18 @@
 #include "app/text.h"
 
 namespace ressort::session {
-namespace {
 
-double cpu_ns() {
+double thread_cpu_ns() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
   return 1e9 * static_cast<double>(now.tv_sec) + static_cast<double>(now.tv_nsec);
 }
 
-}  // namespace
-
 double cpu_time_ns(const Program&, const std::function<void()>& play) {
   const DenormalsFlushed flushed;
-  const double start = cpu_ns();
+  const double start = thread_cpu_ns();
   play();
-  return cpu_ns() - start;
+  return thread_cpu_ns() - start;
 }
 
 void measure(Plan& plan, const Engine& engine, const CompileOptions& options, int voices,

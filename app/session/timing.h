@@ -9,6 +9,9 @@
 
 namespace ressort::session {
 
+// Returns the CPU time of this thread.
+double thread_cpu_ns();
+
 // Measures CPU time of this thread, with denormals flushed: Timings::time on this machine.
 double cpu_time_ns(const Program& program, const std::function<void()>& play);
 

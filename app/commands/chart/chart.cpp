@@ -7,7 +7,6 @@
 #include <csignal>
 #include <cstdio>
 #include <cstring>
-#include <ctime>
 #include <filesystem>
 #include <fstream>
 
@@ -17,8 +16,8 @@
 #include "app/exit_code.h"
 #include "app/realtime/lockfree.h"
 #include "app/session/files.h"
+#include "app/session/timing.h"
 #include "app/text.h"
-#include "app/version.h"
 
 namespace ressort::commands {
 namespace {
@@ -33,12 +32,6 @@ using ReportProgress = std::function<bool(const std::string&)>;
 
 // Program, date and processor, for the caption of the figures.
 std::string provenance() {
-  const std::time_t now = std::time(nullptr);
-  char date[16] = "";
-  std::tm local{};
-  if (localtime_r(&now, &local) != nullptr) {
-    std::strftime(date, sizeof date, "%Y-%m-%d", &local);
-  }
   std::string processor = "an unknown processor";
   std::ifstream file("/proc/cpuinfo");
   for (std::string line; std::getline(file, line);) {
@@ -47,7 +40,7 @@ std::string provenance() {
       break;
     }
   }
-  return std::string("ressort ") + version + " (" + commit + "), " + date + ", " + processor;
+  return made_today() + ", " + processor;
 }
 
 // --- playing -------------------------------------------------------------------------------------
@@ -106,12 +99,6 @@ std::vector<PlayedWay> play_all(const Starts& starts, Isa isa, const ReportProgr
 
 // --- timing --------------------------------------------------------------------------------------
 
-double cpu_ns() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return 1e9 * static_cast<double>(now.tv_sec) + static_cast<double>(now.tv_nsec);
-}
-
 // Pins this thread to its current core.
 void stay_on_one_core() {
   cpu_set_t cores;
@@ -123,16 +110,16 @@ void stay_on_one_core() {
 // Plays every method once and keeps the shortest time of each stretch. Returns the total time.
 double time_round(std::vector<MadeWay>& ways, std::vector<std::vector<double>>& shortest_ns,
                   const std::function<bool()>& stops) {
-  const double start = cpu_ns();
+  const double start = thread_cpu_ns();
   for (std::size_t i = 0; i < ways.size() && !stops(); ++i) {
     ways[i].player->rewind();
     for (double& kept : shortest_ns[i]) {
-      const double before = cpu_ns();
+      const double before = thread_cpu_ns();
       ways[i].player->play(stretch * ways[i].way.oversampling, nullptr);
-      kept = std::min(kept, cpu_ns() - before);
+      kept = std::min(kept, thread_cpu_ns() - before);
     }
   }
-  return cpu_ns() - start;
+  return thread_cpu_ns() - start;
 }
 
 // Times the methods in turn over the beginning of the scene, as much of it as `patience_s` allows.

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <ctime>
 #include <filesystem>
 #include <mutex>
 #include <thread>
@@ -17,7 +16,6 @@
 #include "app/session/loader.h"
 #include "app/session/sound_file.h"
 #include "app/text.h"
-#include "app/version.h"
 
 namespace ressort::commands {
 namespace {
@@ -176,16 +174,6 @@ ShownPreset show(const GalleryOptions& options, const std::string& name,
   return shown;
 }
 
-std::string today() {
-  const std::time_t now = std::time(nullptr);
-  char date[16] = "";
-  std::tm local{};
-  if (localtime_r(&now, &local) != nullptr) {
-    std::strftime(date, sizeof date, "%Y-%m-%d", &local);
-  }
-  return date;
-}
-
 // Plays all presets, one thread per core.
 std::vector<ShownPreset> show_all(const GalleryOptions& options,
                                   const std::vector<std::string>& names,
@@ -243,8 +231,7 @@ int gallery(const GalleryOptions& options, const ShouldContinue& should_continue
     print_error("interrupted; no page is written");
     return exit_code::our_failure;
   }
-  const std::string made = std::string("ressort ") + version + " (" + commit + "), " + today() +
-                           ", " + fixed(options.rate_hz, 0) + " Hz";
+  const std::string made = made_today() + ", " + fixed(options.rate_hz, 0) + " Hz";
   const std::filesystem::path folder = options.folder;
   const bool is_forced = true;
   if (const int code =

@@ -28,10 +28,9 @@ namespace {
 namespace fs = std::filesystem;
 
 bool names_sound(const std::string& name) {
-  std::string ending = fs::path(name).extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
-  return std::find(sound_endings().begin(), sound_endings().end(), ending) != sound_endings().end();
+  const std::string ending = fs::path(name).extension().string();
+  return std::ranges::any_of(sound_endings(),
+                             [&](std::string_view known) { return same_but_case(known, ending); });
 }
 
 // Replaces the name of a temporary file in a message.
@@ -199,7 +198,7 @@ int describe(const DescribeOptions& options, const std::function<bool()>& should
           bar.show(share, options.name);
           return should_continue();
         },
-        [](const std::string& warning) { std::fprintf(stderr, "%s\n", warning.c_str()); });
+        print_error);
   }
   if (!should_continue()) {
     std::fprintf(stderr, "%s: interrupted\n", options.name.c_str());

@@ -198,26 +198,31 @@ Result<Description> describe_sound(const std::string& path, const DescriptionOpt
   if (options.at) {
     return describe_frame(path, *first, *options.at, options, std::move(description));
   }
-  const auto should_continue = [&](double pass, const MonoReader& reader) {
+  const auto each_block = [&](double pass, MonoReader& reader, auto&& use) -> Result<Done> {
     const auto all = static_cast<double>(std::max(1LL, reader.frames()));
-    return progress(0.5 * (pass + static_cast<double>(reader.read_so_far()) / all));
+    while (true) {
+      const auto block = reader.next();
+      if (!block) {
+        return block.error();
+      }
+      if (block->empty()) {
+        return Done{};
+      }
+      use(*block);
+      if (!progress(0.5 * (pass + static_cast<double>(reader.read_so_far()) / all))) {
+        return Error{description_stopped};
+      }
+    }
   };
   LoudestStretch loudest_stretch(std::max(options.frame, pitch_samples(description.rate_hz)));
   EnvelopeSums sums;
   Envelope rough(description.rate_hz, [&](double value) { sums.add(value); });
-  while (true) {
-    const auto block = first->next();
-    if (!block) {
-      return block.error();
-    }
-    if (block->empty()) {
-      break;
-    }
-    loudest_stretch.add(*block);
-    rough.add(*block);
-    if (!should_continue(0.0, *first)) {
-      return Error{description_stopped};
-    }
+  auto read = each_block(0.0, *first, [&](std::span<const double> block) {
+    loudest_stretch.add(block);
+    rough.add(block);
+  });
+  if (!read) {
+    return read.error();
   }
   rough.end();
   description.samples = first->read_so_far();
@@ -249,19 +254,12 @@ Result<Description> describe_sound(const std::string& path, const DescriptionOpt
                          description.frequencies_hz = analysis.frequencies_hz();
                        }
                      });
-  while (true) {
-    const auto block = second->next();
-    if (!block) {
-      return block.error();
-    }
-    if (block->empty()) {
-      break;
-    }
-    again.add(*block);
-    frames.add(*block);
-    if (!should_continue(1.0, *second)) {
-      return Error{description_stopped};
-    }
+  read = each_block(1.0, *second, [&](std::span<const double> block) {
+    again.add(block);
+    frames.add(block);
+  });
+  if (!read) {
+    return read.error();
   }
   again.end();
   if (second->read_so_far() != description.samples) {
