@@ -1,5 +1,6 @@
 // The command play.
 #include <signal.h>
+#include <sys/time.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -44,6 +45,13 @@ sigset_t block_signals() {
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   signal(SIGPIPE, SIG_IGN);
   return signals;
+}
+
+// Exits the process if a regular shutdown takes longer than 0.9 s, for example in a library.
+void limit_shutdown() {
+  signal(SIGALRM, [](int) { _exit(exit_code::done); });
+  const itimerval time{{}, {0, 900'000}};
+  setitimer(ITIMER_REAL, &time, nullptr);
 }
 
 // All parts of the playing program, declared in reverse order of their shutdown.
@@ -506,7 +514,7 @@ class Player {
     const timespec time{0, std::chrono::nanoseconds(patience).count()};
     if (!has_called_off_ && sigtimedwait(&signals_, nullptr, &time) > 0) {
       has_called_off_ = true;
-      last_resort_.emplace();
+      limit_shutdown();
     }
     return has_called_off_;
   }
@@ -601,8 +609,7 @@ class Player {
 
   PlayOptions options_;
   sigset_t signals_;
-  bool has_called_off_ = false;            // set by a signal
-  std::optional<LastResort> last_resort_;  // set by the first signal; destroyed last
+  bool has_called_off_ = false;  // set by a signal
   MotionFeed motion_{process_};
   std::unique_ptr<const SampleTape> tape_;  // outlives the process that plays it
   std::unique_ptr<ThreadPool> helpers_;     // outlives the engines; null: the audio thread is alone
