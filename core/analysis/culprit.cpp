@@ -203,15 +203,8 @@ std::optional<double> Proofs::limit(const Suspect& suspect, std::span<const Rang
 }
 
 const char* quantity_name(Quantity quantity) {
-  switch (quantity) {
-    case Quantity::mass:
-      return "mass";
-    case Quantity::stiffness:
-      return "stiffness";
-    case Quantity::damping:
-      return "damping";
-  }
-  return "";
+  constexpr const char* names[] = {"mass", "stiffness", "damping"};
+  return names[static_cast<std::size_t>(quantity)];
 }
 
 std::string print_limit(double value, bool is_upper) {

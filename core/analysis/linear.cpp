@@ -372,17 +372,12 @@ std::optional<Network> fixed_held(const Network& network) {
 }  // namespace
 
 bool is_linear(const Network& network) {
-  for (const Link& link : network.links) {
-    if (!is_linear(link.law)) {
-      return false;
-    }
-  }
   for (std::uint32_t i = 0; i < network.masses.size(); ++i) {
     if (is_live_place(network, i)) {
       return false;
     }
   }
-  return true;
+  return std::ranges::all_of(network.links, [](const Link& link) { return is_linear(link.law); });
 }
 
 double scheme_frequency_hz(double stiffness, double damping, double rate_hz) {

@@ -1,6 +1,6 @@
 #include "core/linear_algebra/lanczos.h"
 
-#include <Eigen/Core>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -13,6 +13,7 @@ namespace {
 
 using Dense = Eigen::MatrixXd;
 using Index = Eigen::Index;
+using Symmetric = Eigen::SelfAdjointEigenSolver<Dense>;  // Its eigenvalues ascend.
 
 constexpr double tolerance = 1e-9;  // Largest residual of a pair, relative to the pair.
 // A direction whose norm shrinks below this in the orthogonalisation is dropped.
@@ -23,19 +24,6 @@ Dense times(const Multiply& multiply, const Dense& x) {
   std::copy_n(x.data(), x.size(), std::begin(columns.values));
   multiply(columns);
   return Eigen::Map<const Dense>(std::begin(columns.values), x.rows(), x.cols());
-}
-
-// Eigenpairs of a symmetric matrix, ascending.
-struct Symmetric {
-  Eigen::VectorXd values;
-  Dense vectors;
-};
-Symmetric pairs_of(const Dense& matrix) {
-  Matrix plain(static_cast<std::size_t>(matrix.rows()), static_cast<std::size_t>(matrix.cols()));
-  std::copy_n(matrix.data(), matrix.size(), std::begin(plain.values));
-  const Eigenpairs pairs = symmetric_eigenpairs(plain);
-  return {Eigen::Map<const Eigen::VectorXd>(std::begin(pairs.values), matrix.rows()),
-          Eigen::Map<const Dense>(std::begin(pairs.vectors.values), matrix.rows(), matrix.cols())};
 }
 
 // Returns a matrix of pseudo-random numbers between -1 and 1, the same on every machine.
@@ -59,11 +47,11 @@ Orthogonal orthogonal(const Dense& w, const Multiply& b) {
   // Two passes: after the first, nearly equal columns consist of rounding error.
   for (int pass = 0; pass < 2; ++pass) {
     const Dense gram = found.q.transpose() * found.bq;
-    const Symmetric pairs = pairs_of(gram);
-    const double most = std::max(pairs.values.maxCoeff(), 0.0);
-    const Index width = (pairs.values.array() > lost * most).count();
-    const Dense vectors = pairs.vectors.rightCols(width);
-    const Eigen::VectorXd size = pairs.values.tail(width).cwiseSqrt();
+    const Symmetric pairs(gram);
+    const double most = std::max(pairs.eigenvalues().maxCoeff(), 0.0);
+    const Index width = (pairs.eigenvalues().array() > lost * most).count();
+    const Dense vectors = pairs.eigenvectors().rightCols(width);
+    const Eigen::VectorXd size = pairs.eigenvalues().tail(width).cwiseSqrt();
     found.q = found.q * vectors * size.cwiseInverse().asDiagonal();
     found.bq = times(b, found.q);
     found.r = size.asDiagonal() * vectors.transpose() * found.r;
@@ -105,10 +93,9 @@ std::optional<Eigenpairs> lowest_pairs(double shift, int count, int size, const 
     const bool is_whole = used == n || rest.q.cols() == 0;
     const bool is_full = used + rest.q.cols() > most;
     if (used >= count && (is_whole || is_full || used >= count + width)) {
-      const Dense top = t.topLeftCorner(used, used);
-      const Symmetric all = pairs_of(top);
-      const Eigen::VectorXd theta = all.values.tail(count);
-      const Dense ritz = all.vectors.rightCols(count);
+      const Symmetric all(t.topLeftCorner(used, used));
+      const Eigen::VectorXd theta = all.eigenvalues().tail(count);
+      const Dense ritz = all.eigenvectors().rightCols(count);
       double residual = 0.0;
       for (Index i = 0; i < count && !is_whole; ++i) {
         residual = std::max(residual, (rest.r * ritz.col(i).tail(now)).norm() / std::abs(theta(i)));
