@@ -118,17 +118,7 @@ Proved prove(const Scene& scene, const Compiled& compiled, const Progress& progr
   return proved;
 }
 
-const char* verdict_name(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::stable:
-      return "stable";
-    case Verdict::unstable:
-      return "unstable";
-    case Verdict::unproved:
-      return "unproved";
-  }
-  return "";
-}
+constexpr const char* verdict_names[] = {"stable", "unstable", "unproved"};  // [Verdict]
 
 std::string describe(const std::optional<SafeRange>& safe) {
   return safe ? describe(*safe) : "stable nowhere";
@@ -156,7 +146,7 @@ json parameter_json(const ParameterInfo& info, int input, const std::optional<Sa
 }
 
 json stability_json(const Proved& proved) {
-  json out{{"verdict", verdict_name(proved.certificate.verdict)},
+  json out{{"verdict", verdict_names[static_cast<std::size_t>(proved.certificate.verdict)]},
            {"limits_hold", proved.others_move ? "in all ranges" : "at the initial values"},
            {"stiffness_factor", limit_json(proved.stiffness_factor)}};
   if (const std::optional<Culprit>& culprit = proved.certificate.culprit) {
@@ -235,25 +225,27 @@ json scene_json(const Scene& scene, const Compiled& compiled, const Proved& prov
   return out;
 }
 
+void add_warning(Finding finding, std::vector<Finding>& findings) {
+  finding.diagnostic.severity = Severity::warning;
+  findings.push_back(std::move(finding));
+}
+
 // Reports the element that makes the scene unstable, at its line of the model.
 void warn(const Proved& proved, const Scene& scene, std::vector<Finding>& findings) {
   if (!proved.certificate.culprit) {
     return;
   }
   const Error error = complaint(proved.certificate);
-  Finding finding =
-      proved.file.empty() ? finding_in_model(scene, error) : finding_in_file(proved.file, error);
-  finding.diagnostic.severity = Severity::warning;
-  findings.push_back(std::move(finding));
+  add_warning(
+      proved.file.empty() ? finding_in_model(scene, error) : finding_in_file(proved.file, error),
+      findings);
 }
 
 // Warns if the CPU is too slow for all voices.
 void warn(const Scene& scene, const Compiled& compiled, std::vector<Finding>& findings) {
   const std::string text = overload_warning(compiled, CompileOptions(), {.time = cpu_time_ns});
   if (!text.empty()) {
-    Finding finding = finding_of(scene.path, "", Error{text});
-    finding.diagnostic.severity = Severity::warning;
-    findings.push_back(std::move(finding));
+    add_warning(finding_of(scene.path, "", Error{text}), findings);
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <numbers>
 
 #include "app/text.h"
@@ -16,15 +17,12 @@ constexpr double periods = 34.0;
 constexpr double shortest_window_s = 0.012;
 constexpr double longest_window_s = 0.3;
 
-struct Wavelet {
-  std::vector<double> re;
-  std::vector<double> im;
-};
+using Wavelet = std::vector<std::complex<double>>;
 
 Wavelet make_wavelet(double frequency_hz, double rate_hz) {
   const double length_s = std::clamp(periods / frequency_hz, shortest_window_s, longest_window_s);
   const auto count = static_cast<std::size_t>(length_s * rate_hz) | 1U;
-  Wavelet made{std::vector<double>(count), std::vector<double>(count)};
+  Wavelet made(count);
   for (std::size_t n = 0; n < count; ++n) {
     const double middle = static_cast<double>(n) - 0.5 * static_cast<double>(count - 1);
     const double phase = 2.0 * std::numbers::pi * frequency_hz / rate_hz * middle;
@@ -32,25 +30,21 @@ Wavelet make_wavelet(double frequency_hz, double rate_hz) {
     const double weight =
         2.0 / static_cast<double>(count) *
         (1.0 + std::cos(2.0 * std::numbers::pi * middle / static_cast<double>(count)));
-    made.re[n] = weight * std::cos(phase);
-    made.im[n] = weight * std::sin(phase);
+    made[n] = std::polar(weight, phase);
   }
   return made;
 }
 
 double power_at(const std::vector<double>& samples, const Wavelet& wavelet, long long middle) {
-  const auto count = static_cast<long long>(wavelet.re.size());
+  const auto count = static_cast<long long>(wavelet.size());
   const long long first = middle - count / 2;
   const long long begin = std::max(0LL, -first);
   const long long end = std::min(count, static_cast<long long>(samples.size()) - first);
-  double re = 0.0;
-  double im = 0.0;
+  std::complex<double> sum;
   for (long long n = begin; n < end; ++n) {
-    const double y = samples[static_cast<std::size_t>(first + n)];
-    re += y * wavelet.re[static_cast<std::size_t>(n)];
-    im += y * wavelet.im[static_cast<std::size_t>(n)];
+    sum += samples[static_cast<std::size_t>(first + n)] * wavelet[static_cast<std::size_t>(n)];
   }
-  return re * re + im * im;
+  return std::norm(sum);
 }
 
 }  // namespace

@@ -80,7 +80,7 @@ int modes_command(const ModesOptions& options) {
     return reject(scene.error().message);
   }
   for (const std::string& warning : scene->warnings) {
-    std::fprintf(stderr, "%s\n", warning.c_str());
+    print_error(warning);
   }
   const std::string read[] = {scene->path, scene->model_path};
   if (auto spared = check_not_input(options.output, read); !spared) {
@@ -115,7 +115,7 @@ int modes_command(const ModesOptions& options) {
   // Warns about divergence without oscillation, which is not a mode.
   if (search.scheme == ModeScheme::published) {
     if (const auto warning = instability(*scene, parameters, search.rate_hz, progress)) {
-      std::fprintf(stderr, "%s\n", to_string(*warning).c_str());
+      print_error(to_string(*warning));
     }
   }
   if (!options.output.empty()) {

@@ -54,6 +54,12 @@ void limit_shutdown() {
   setitimer(ITIMER_REAL, &time, nullptr);
 }
 
+// Prints an error in the arguments or the input. Returns its exit code.
+int refuse(const std::string& message) {
+  complain(message);
+  return exit_code::wrong_use;
+}
+
 // All parts of the playing program, declared in reverse order of their shutdown.
 class Player {
  public:
@@ -61,8 +67,7 @@ class Player {
 
   int run() {
     if (const auto allowed = allowed_senders(options_.osc); options_.osc.port != 0 && !allowed) {
-      complain(allowed.error().message);
-      return exit_code::wrong_use;
+      return refuse(allowed.error().message);
     }
     if (is_midi_file_name(options_.name)) {  // MODEL may be a MIDI file
       options_.midi = std::exchange(options_.name, PlayOptions().name);
@@ -71,8 +76,7 @@ class Player {
     if (is_midi_file_name(options_.midi)) {
       auto read = read_midi_file(options_.midi);
       if (!read) {
-        complain(read.error().message);
-        return exit_code::wrong_use;
+        return refuse(read.error().message);
       }
       song = *std::move(read);
       for (const std::string& warning : song->warnings) {
@@ -85,8 +89,7 @@ class Player {
     }
     auto controllers = read_controllers();
     if (!controllers) {
-      complain(controllers.error().message);
-      return exit_code::wrong_use;
+      return refuse(controllers.error().message);
     }
     options_.device.sends_midi =
         std::any_of(controllers->begin(), controllers->end(),
@@ -105,8 +108,7 @@ class Player {
       return exit_code::done;
     }
     if (!scene) {
-      complain(scene.error().message);
-      return exit_code::wrong_use;
+      return refuse(scene.error().message);
     }
     options_.device.outputs = std::max(2, output_count(scene->network));
     if (options_.threads > 1) {
@@ -155,8 +157,7 @@ class Player {
       return exit_code::done;
     }
     if (!loaded) {
-      complain(loaded.error().message);
-      return exit_code::wrong_use;
+      return refuse(loaded.error().message);
     }
     greet(**loaded);
     open_osc();
@@ -264,8 +265,7 @@ class Player {
         [this] { return save_project(); },
         [this] { return session_ ? current_state(*session_) : std::string(); });
     if (!manager) {
-      complain(manager.error().message);
-      return exit_code::wrong_use;
+      return refuse(manager.error().message);
     }
     manager_ = *std::move(manager);
     const auto end = std::chrono::steady_clock::now() + 5s;
@@ -339,8 +339,7 @@ class Player {
   int play_flight() {
     const auto player = FlightPlayer::open(options_.name, flight_heard_s);
     if (!player) {
-      complain(player.error().message);
-      return exit_code::wrong_use;
+      return refuse(player.error().message);
     }
     for (const std::string& warning : player->warnings()) {
       voice_.say(warning);
@@ -350,8 +349,7 @@ class Player {
       return exit_code::done;
     }
     if (!tape) {
-      complain(tape.error().message);
-      return exit_code::wrong_use;
+      return refuse(tape.error().message);
     }
     options_.device.outputs = static_cast<int>(std::max<std::size_t>(2, tape->channels));
     options_.device.rate_hz = player->rate_hz();
@@ -492,8 +490,7 @@ class Player {
         return exit_code::done;
       }
       if (!ran) {
-        complain(ran.error().message);
-        return exit_code::wrong_use;
+        return refuse(ran.error().message);
       }
       if (console_->has_quit()) {
         return exit_code::done;

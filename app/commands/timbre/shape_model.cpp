@@ -200,7 +200,7 @@ int shape_model(const ShapeOptions& options, const std::function<bool()>& should
     return refuse(compiled.error().message);
   }
   for (const std::string& warning : warnings) {
-    std::fprintf(stderr, "%s\n", warning.c_str());
+    print_error(warning);
   }
   const Instrument& instrument = compiled->instrument;
   const bool has_keys = scene->has_preset && instrument.mode.has_value();
@@ -245,7 +245,7 @@ int shape_model(const ShapeOptions& options, const std::function<bool()>& should
     auto written = output->write(*text);
     written = written ? output->keep() : written;
     if (!written) {
-      std::fprintf(stderr, "%s\n", written.error().message.c_str());
+      print_error(written.error().message);
       return exit_code::our_failure;
     }
   }

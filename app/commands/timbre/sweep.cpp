@@ -182,7 +182,7 @@ int sweep(const DescribeOptions& options, const std::function<bool()>& should_co
   std::set<std::string> printed;
   const auto warn_once = [&](const std::string& text) {
     if (printed.insert(text).second) {
-      std::fprintf(stderr, "%s\n", text.c_str());
+      print_error(text);
     }
   };
   {
