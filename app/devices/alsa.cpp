@@ -5,6 +5,7 @@
 #include <cstring>
 #include <memory>
 #include <thread>
+#include <type_traits>
 #include <vector>
 
 #include "app/devices/audio.h"
@@ -43,6 +44,20 @@ struct Capture {
   std::vector<const float*> inputs;
 };
 
+// Calls use(samples, full_scale) with the stream's packed samples in their own type.
+template <class Use>
+void with_samples(Stream& stream, Use&& use) {
+  void* const packed = stream.packed.data();
+  switch (stream.format) {
+    case SND_PCM_FORMAT_S32:
+      return use(static_cast<std::int32_t*>(packed), 2147483648.0);
+    case SND_PCM_FORMAT_S16:
+      return use(static_cast<std::int16_t*>(packed), 32768.0);
+    default:
+      return use(static_cast<float*>(packed), 1.0);
+  }
+}
+
 struct Alsa {
   explicit Alsa(Process& process_in) : process(process_in) {}
 
@@ -67,27 +82,17 @@ struct Alsa {
 // Converts the output to the device's format. The process limits it to full scale, so nothing
 // clips.
 void Alsa::interleave() {
-  const auto fill = [&](auto zero, double scale) {
-    using Sample = decltype(zero);
-    auto* const target = reinterpret_cast<Sample*>(out.packed.data());
+  with_samples(out, [&](auto* target, double full_scale) {
+    using Sample = std::remove_pointer_t<decltype(target)>;
+    // The largest whole number is one less than full scale.
+    const double scale = std::is_integral_v<Sample> ? full_scale - 1.0 : full_scale;
     for (std::size_t n = 0; n < out.frames; ++n) {
       for (std::size_t c = 0; c < out.channels; ++c) {
         target[n * out.channels + c] =
             static_cast<Sample>(static_cast<double>(outputs[c][n]) * scale);
       }
     }
-  };
-  switch (out.format) {
-    case SND_PCM_FORMAT_S32:
-      fill(std::int32_t{}, 2147483647.0);
-      break;
-    case SND_PCM_FORMAT_S16:
-      fill(std::int16_t{}, 32767.0);
-      break;
-    default:
-      fill(float{}, 1.0);
-      break;
-  }
+  });
 }
 
 // Writes a period to the device; false if the device is lost.
@@ -154,9 +159,8 @@ std::span<const float* const> Alsa::listen() {
     got =
         std::max<snd_pcm_sframes_t>(0, snd_pcm_readi(stream.pcm, stream.packed.data(), out.frames));
   }
-  const auto fill = [&](auto zero, float scale) {
-    using Sample = decltype(zero);
-    const auto* const source = reinterpret_cast<const Sample*>(stream.packed.data());
+  with_samples(stream, [&](const auto* source, double full_scale) {
+    const auto scale = static_cast<float>(1.0 / full_scale);
     for (std::size_t c = 0; c < stream.channels; ++c) {
       for (std::size_t n = 0; n < out.frames; ++n) {
         capture->samples[c * out.frames + n] =
@@ -165,18 +169,7 @@ std::span<const float* const> Alsa::listen() {
                 : 0.0f;
       }
     }
-  };
-  switch (stream.format) {
-    case SND_PCM_FORMAT_S32:
-      fill(std::int32_t{}, 1.0f / 2147483648.0f);
-      break;
-    case SND_PCM_FORMAT_S16:
-      fill(std::int16_t{}, 1.0f / 32768.0f);
-      break;
-    default:
-      fill(float{}, 1.0f);
-      break;
-  }
+  });
   return capture->inputs;
 }
 

@@ -24,8 +24,6 @@ constexpr int most_audio_inputs = 16;
 // limit for one block; more than a port's buffer holds
 constexpr std::size_t most_midi_packets = 4096;
 
-using Ports = std::unique_ptr<const char*, decltype(&jack_free)>;
-
 struct Jack {
   Jack(Process& process_in, const AudioOptions& options_in)
       : process(process_in), options(options_in) {}
@@ -172,38 +170,42 @@ void connect_unless_removed(Jack& jack, jack_port_t* ours, const char* theirs) {
   }
 }
 
+// Returns the names in a list of libjack's, which may be null.
+std::vector<std::string> names_of(const char** list) {
+  const std::unique_ptr<const char*, decltype(&jack_free)> ports(list, jack_free);
+  std::vector<std::string> names;
+  for (std::size_t i = 0; ports && ports.get()[i] != nullptr; ++i) {
+    names.emplace_back(ports.get()[i]);
+  }
+  return names;
+}
+
+std::vector<std::string> physical_ports(Jack& jack, const char* type, unsigned long direction) {
+  return names_of(jack_get_ports(jack.client, nullptr, type, JackPortIsPhysical | direction));
+}
+
 // Connects our outputs to the physical outputs in order. Returns false if there are none.
 bool connect(Jack& jack) {
-  const Ports speakers(jack_get_ports(jack.client, nullptr, JACK_DEFAULT_AUDIO_TYPE,
-                                      JackPortIsPhysical | JackPortIsInput),
-                       jack_free);
-  for (std::size_t i = 0; speakers && i < jack.outputs.size() && speakers.get()[i] != nullptr;
-       ++i) {
-    connect_unless_removed(jack, jack.outputs[i], speakers.get()[i]);
+  const auto speakers = physical_ports(jack, JACK_DEFAULT_AUDIO_TYPE, JackPortIsInput);
+  for (std::size_t i = 0; i < std::min(speakers.size(), jack.outputs.size()); ++i) {
+    connect_unless_removed(jack, jack.outputs[i], speakers[i].c_str());
   }
-  return speakers && speakers.get()[0] != nullptr;
+  return !speakers.empty();
 }
 
 void connect_midi(Jack& jack) {
-  const Ports keyboards(jack_get_ports(jack.client, nullptr, JACK_DEFAULT_MIDI_TYPE,
-                                       JackPortIsPhysical | JackPortIsOutput),
-                        jack_free);
-  for (std::size_t i = 0; keyboards && keyboards.get()[i] != nullptr; ++i) {
-    connect_unless_removed(jack, jack.midi, keyboards.get()[i]);
+  for (const std::string& keyboard :
+       physical_ports(jack, JACK_DEFAULT_MIDI_TYPE, JackPortIsOutput)) {
+    connect_unless_removed(jack, jack.midi, keyboard.c_str());
   }
 }
 
 void connect_inputs(Jack& jack) {
-  const Ports microphones(jack_get_ports(jack.client, nullptr, JACK_DEFAULT_AUDIO_TYPE,
-                                         JackPortIsPhysical | JackPortIsOutput),
-                          jack_free);
-  for (std::size_t i = 0; microphones && i < jack.inputs.size(); ++i) {
+  const auto microphones = physical_ports(jack, JACK_DEFAULT_AUDIO_TYPE, JackPortIsOutput);
+  for (std::size_t i = 0; i < std::min(microphones.size(), jack.inputs.size()); ++i) {
     jack_port_t* const port = jack.inputs[i].get();
-    if (port == nullptr || microphones.get()[i] == nullptr) {
-      return;
-    }
-    if (jack_port_connected(port) == 0) {
-      connect_unless_removed(jack, port, microphones.get()[i]);
+    if (port != nullptr && jack_port_connected(port) == 0) {
+      connect_unless_removed(jack, port, microphones[i].c_str());
     }
   }
 }
@@ -271,9 +273,8 @@ void update_wiring(Jack& jack, bool is_quiet) {
   const std::vector<jack_port_t*> ports = own_ports(jack);
   std::vector<Cable> present;
   for (jack_port_t* const port : ports) {
-    const Ports others(jack_port_get_all_connections(jack.client, port), jack_free);
-    for (std::size_t i = 0; others && others.get()[i] != nullptr; ++i) {
-      present.push_back({jack_port_short_name(port), others.get()[i]});
+    for (std::string& other : names_of(jack_port_get_all_connections(jack.client, port))) {
+      present.push_back({jack_port_short_name(port), std::move(other)});
     }
   }
   const auto exists = [&](const std::string& port) {
