@@ -18,9 +18,10 @@ const char* const examples =
     "- a recording of one object, struck once (.wav, .flac, .ogg, .aiff, ...). The body has its "
     "modes, the\n"
     "  place `hit`, and a place for each channel: `mic`, `left` and `right`, or `mic1` and so on.\n"
-    "- the closed surface of a solid (.stl, .obj). Finite elements find its modes. ressort meshes "
-    "boxes and\n"
-    "  balls itself; other shapes need gmsh or tetgen.\n"
+    "- the surface of a solid (.stl, .obj, .ply, .off), or with --thickness of a shell. Finite "
+    "elements find\n"
+    "  its modes. ressort meshes boxes, balls and shells itself; other solids need gmsh or "
+    "tetgen.\n"
     "- a model (.mdl). The body has its modes, with its inputs and outputs as places. With --chain "
     "it\n"
     "  becomes a chain of masses and springs with the same response at one place.\n"
@@ -28,6 +29,7 @@ const char* const examples =
     "  ressort body bowl.wav -o bowl.mdl --modes 20 --picture bowl.svg\n"
     "  ressort body tom.wav -o Tom.toml     # a preset with its model, Tom.mdl, and its noise\n"
     "  ressort body bell.stl --material bronze --scale 0.001 --place rim=150,0,0 -o bell.mdl\n"
+    "  ressort body gong.obj --material bronze --scale 0.001 --thickness 1.2 -o gong.mdl\n"
     "  ressort body bar.obj --young 11e9 --poisson 0.25 --density 750 --loss 0.01 -o bar.mdl\n"
     "  ressort body drum.mdl -o drum_body.mdl\n"
     "  ressort body bell.mdl --chain rim -o chain.mdl\n"
@@ -66,6 +68,11 @@ void add_solid(CLI::App& command, SolidBodyOptions& options) {
       .add_option("--scale", options.scale, "metres per unit of the file; 0.001 for millimetres")
       ->check(within(1e-9, 1e9))
       ->capture_default_str();
+  command
+      .add_option("--thickness", options.thickness_mm,
+                  "the surface, open or closed, is the middle of a wall of this thickness")
+      ->type_name("MM")
+      ->check(within(1e-6, 1e6));
   add_parsed(command, "--place", options.places, parse_place,
              "place: NAME=X,Y,Z or NAME=X,Y,Z,DX,DY,DZ in the file's unit (default: four)");
   add_parsed(command, "--clamp", options.clamps, parse_clamp,

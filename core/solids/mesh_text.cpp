@@ -172,6 +172,7 @@ Result<TetrahedronMesh> read_medit(std::string_view text) {
     }
     mesh.tetrahedra.push_back(tetrahedron);
   }
+  drop_flat(mesh);
   return mesh;
 }
 

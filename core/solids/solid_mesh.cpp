@@ -5,6 +5,8 @@
 #include <numbers>
 #include <utility>
 
+#include "core/groups.h"
+
 namespace ressort::solids {
 namespace {
 
@@ -18,7 +20,19 @@ double six_volumes(const std::vector<Point3>& points, const Tetrahedron& t) {
   return inner(points[at(t[1])] - a, cross(points[at(t[2])] - a, points[at(t[3])] - a));
 }
 
+bool is_flat(const std::vector<Point3>& points, const Tetrahedron& t) {
+  double longest = 0.0;
+  for (const auto& edge : tetrahedron_edges) {
+    longest = std::max(longest, length(points[at(t[edge[0]])] - points[at(t[edge[1]])]));
+  }
+  return !(std::abs(six_volumes(points, t)) > flat * longest * longest * longest);
+}
+
 }  // namespace
+
+void drop_flat(TetrahedronMesh& mesh) {
+  std::erase_if(mesh.tetrahedra, [&](const Tetrahedron& t) { return is_flat(mesh.points, t); });
+}
 
 Result<SolidMesh> quadratic(const TetrahedronMesh& mesh) {
   SolidMesh solid;
@@ -31,16 +45,10 @@ Result<SolidMesh> quadratic(const TetrahedronMesh& mesh) {
         return Error{"a tetrahedron refers to a missing point"};
       }
     }
-    double longest = 0.0;
-    for (const auto& edge : tetrahedron_edges) {
-      longest =
-          std::max(longest, length(mesh.points[at(t[edge[0]])] - mesh.points[at(t[edge[1]])]));
-    }
-    const double volume = six_volumes(mesh.points, t);
-    if (!(std::abs(volume) > flat * longest * longest * longest)) {
+    if (is_flat(mesh.points, t)) {
       return Error{"a tetrahedron at " + to_string(mesh.points[at(t[0])]) + " m is flat"};
     }
-    if (volume < 0.0) {
+    if (six_volumes(mesh.points, t) < 0.0) {
       std::swap(t[2], t[3]);
     }
     for (int& corner : t) {
@@ -267,8 +275,10 @@ TetrahedronMesh detected_ball_mesh(const DetectedBall& ball, double unknowns) {
   return mesh;
 }
 
-TetrahedronMesh oriented_box_mesh(const OrientedBox& box, double unknowns) {
-  const Point3 sides{length(box.sides[0]), length(box.sides[1]), length(box.sides[2])};
+namespace {
+
+// Returns cells for a box of about so many unknowns, as close to cubes as whole numbers allow.
+std::array<int, 3> box_cells(const Point3& sides, double unknowns) {
   // Nodes are half a cell apart: there are (2 nx + 1)(2 ny + 1)(2 nz + 1).
   const auto cells_of = [&](double cell) {
     std::array<int, 3> cells{};
@@ -284,10 +294,70 @@ TetrahedronMesh oriented_box_mesh(const OrientedBox& box, double unknowns) {
   while (count(cells_of(cell / 1.02)) <= unknowns) {
     cell /= 1.02;
   }
-  TetrahedronMesh mesh = box_mesh({1.0, 1.0, 1.0}, cells_of(cell));
+  return cells_of(cell);
+}
+
+}  // namespace
+
+TetrahedronMesh oriented_box_mesh(const OrientedBox& box, double unknowns) {
+  const Point3 sides{length(box.sides[0]), length(box.sides[1]), length(box.sides[2])};
+  TetrahedronMesh mesh = box_mesh({1.0, 1.0, 1.0}, box_cells(sides, unknowns));
   for (Point3& point : mesh.points) {
     point =
         box.corner + point[0] * box.sides[0] + point[1] * box.sides[1] + point[2] * box.sides[2];
+  }
+  return mesh;
+}
+
+TetrahedronMesh grid_mesh(const ClosedSurface& closed, double unknowns, const Progress& progress) {
+  const Box3 box = box_around(closed.surface.points);
+  const Point3 sides = box.high - box.low;
+  const double filled = closed.volume / (sides[0] * sides[1] * sides[2]);
+  const std::array<int, 3> cells = box_cells(sides, unknowns / std::clamp(filled, 0.02, 1.0));
+  const std::size_t nx = at(cells[0]);
+  const std::size_t nxy = nx * at(cells[1]);
+  const std::size_t count = nxy * at(cells[2]);
+  std::vector<char> is_inside(count, 0);
+  Groups groups(count);
+  const auto join = [&](std::size_t cell, std::size_t before) {
+    if (is_inside[before] != 0) {
+      groups.join(static_cast<std::uint32_t>(cell), static_cast<std::uint32_t>(before));
+    }
+  };
+  for (std::size_t cell = 0; cell < count; ++cell) {
+    progress.spend(8 * closed.surface.triangles.size());
+    const std::array<std::size_t, 3> place = {cell % nx, cell % nxy / nx, cell / nxy};
+    Point3 middle = box.low;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      middle[axis] += (static_cast<double>(place[axis]) + 0.5) * sides[axis] / cells[axis];
+    }
+    is_inside[cell] = windings(closed.surface, middle) > 0.5 ? 1 : 0;
+    if (is_inside[cell] != 0) {
+      const std::array<std::size_t, 3> step = {1, nx, nxy};
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        if (place[axis] > 0) {
+          join(cell, cell - step[axis]);
+        }
+      }
+    }
+  }
+  const auto group_of = [&](std::size_t cell) {
+    return groups.find(static_cast<std::uint32_t>(cell));
+  };
+  std::vector<std::size_t> size(count, 0);
+  for (std::size_t cell = 0; cell < count; ++cell) {
+    size[group_of(cell)] += is_inside[cell] != 0 ? 1 : 0;
+  }
+  const auto best =
+      static_cast<std::size_t>(std::max_element(size.begin(), size.end()) - size.begin());
+  TetrahedronMesh mesh = box_mesh(sides, cells);
+  std::size_t tetrahedron = 0;
+  std::erase_if(mesh.tetrahedra, [&](const Tetrahedron&) {
+    const std::size_t cell = tetrahedron++ / 6;
+    return is_inside[cell] == 0 || group_of(cell) != best;
+  });
+  for (Point3& point : mesh.points) {
+    point = box.low + point;
   }
   return mesh;
 }

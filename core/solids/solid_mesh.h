@@ -26,11 +26,14 @@ struct TetrahedronMesh {
   std::vector<Tetrahedron> tetrahedra;
 };
 
-// The edges are straight, so curvature is only as fine as the surface's triangles.
+// The edges are straight, so curvature is only as fine as the surface's triangles. A shell has no
+// elements: its surface is its middle, and the second half of its points are the rotations of the
+// first.
 struct SolidMesh {
   std::vector<Point3> points;  // m
   std::vector<QuadraticTetrahedron> elements;
   std::vector<Triangle> surface;  // Corners, counter-clockwise seen from outside.
+  double thickness = 0.0;         // m, of a shell
 
   std::size_t unknowns() const { return 3 * points.size(); }
 };
@@ -66,6 +69,14 @@ TetrahedronMesh detected_ball_mesh(const DetectedBall& ball, double unknowns);
 // Meshes this box with about so many unknowns and cells as close to cubes as whole numbers allow.
 TetrahedronMesh oriented_box_mesh(const OrientedBox& box, double unknowns);
 
+// Meshes the cells of a grid whose middles are inside the surface, for surfaces that no mesher
+// fills. The mesh has about so many unknowns and the surface of a staircase. Returns the largest
+// part that hangs together by faces.
+TetrahedronMesh grid_mesh(const ClosedSurface& closed, double unknowns, const Progress& progress);
+
+// Drops tetrahedra without volume.
+void drop_flat(TetrahedronMesh& mesh);
+
 // Returns the node spacing, in m, that gives a solid of this volume about so many unknowns.
 double edge_length(double volume, double unknowns);
 
@@ -73,7 +84,8 @@ double edge_length(double volume, double unknowns);
 std::string as_stl(const ClosedSurface& closed);  // ASCII STL with one solid per shell.
 // TetGen's format, with a point in every cavity.
 std::string as_smesh(const ClosedSurface& closed);
-// Reads the vertices and tetrahedra of Medit's ASCII format, which Gmsh and TetGen write.
+// Reads the vertices and tetrahedra of Medit's ASCII format, which Gmsh and TetGen write. Drops the
+// flat tetrahedra that they leave between points of one plane.
 Result<TetrahedronMesh> read_medit(std::string_view text);
 
 }  // namespace ressort::solids

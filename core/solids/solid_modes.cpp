@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "core/linear_algebra/lanczos.h"
+#include "core/solids/shell.h"
 
 namespace ressort::solids {
 namespace {
@@ -109,10 +110,23 @@ double mass_share(std::size_t a, std::size_t b) {
   return (common == 2 ? 32.0 : common == 1 ? 16.0 : 8.0) / 420.0;
 }
 
+// The nodes of a shell's triangle: three displacements and three rotations.
+using ShellNodes = std::array<int, 6>;
+
+std::vector<ShellNodes> shell_nodes(const SolidMesh& mesh) {
+  std::vector<ShellNodes> nodes;
+  const int half = static_cast<int>(mesh.points.size() / 2);
+  for (const auto& [a, b, c] : mesh.surface) {
+    nodes.push_back({a, b, c, half + a, half + b, half + c});
+  }
+  return nodes;
+}
+
 // Returns the coupling pattern of the free nodes, all values 0.
-SparseMatrix pattern_of(const SolidMesh& mesh, const std::vector<int>& row_of, int rows) {
+template <class Elements>
+SparseMatrix pattern_of(const Elements& elements, const std::vector<int>& row_of, int rows) {
   std::vector<std::vector<int>> below(at(rows));
-  for (const QuadraticTetrahedron& element : mesh.elements) {
+  for (const auto& element : elements) {
     for (const int a : element) {
       for (const int b : element) {
         const int row = row_of[at(a)];
@@ -141,11 +155,61 @@ SparseMatrix pattern_of(const SolidMesh& mesh, const std::vector<int>& row_of, i
 }
 
 // Returns a shift below all modes of a solid of this size: (omega of a twentieth of the travel time
-// of sound through it)^2.
+// of sound through it)^2. The modes of a shell are the lower, the thinner its wall is.
 double shift_of(const SolidMesh& mesh, const SolidMaterial& material) {
-  const double omega =
-      0.05 * std::sqrt(material.young / material.density) / box_around(mesh.points).diagonal();
+  const double size = box_around(mesh.points).diagonal();
+  const double thinness = mesh.thickness > 0.0 ? std::min(1.0, 10.0 * mesh.thickness / size) : 1.0;
+  const double omega = 0.05 * thinness * std::sqrt(material.young / material.density) / size;
   return -omega * omega;
+}
+
+void assemble_shell(const SolidMesh& mesh, const SolidMaterial& material,
+                    const std::vector<int>& row_of, SolidMatrices& matrices,
+                    const Progress& progress) {
+  for (const ShellNodes& nodes : shell_nodes(mesh)) {
+    progress.spend(2000);
+    const ShellElement element = shell_element(
+        {mesh.points[at(nodes[0])], mesh.points[at(nodes[1])], mesh.points[at(nodes[2])]}, material,
+        mesh.thickness);
+    const double turning = mesh.thickness * mesh.thickness / 12.0;
+    for (std::size_t a = 0; a < 6; ++a) {
+      for (std::size_t b = 0; b < 6; ++b) {
+        const int row = row_of[at(nodes[a])];
+        const int column = row_of[at(nodes[b])];
+        if (column < 0 || row < column) {
+          continue;
+        }
+        const std::size_t i = matrices.mass.find(row, column);
+        if (a / 3 == b / 3) {
+          // Two parts of mass at the corners and one part spread linearly: its mean error is less
+          // than that of either.
+          matrices.mass.value[i] +=
+              element.mass / 36.0 * (a == b ? 10.0 : 1.0) * (a < 3 ? 1.0 : turning);
+        }
+        for (std::size_t k = 0; k < 9; ++k) {
+          matrices.stiffness[i][k] += element.stiffness[a][b][k];
+        }
+      }
+    }
+  }
+}
+
+double mass_of(const SolidMesh& mesh, const SolidMaterial& material) {
+  double volume = 0.0;
+  for (const QuadraticTetrahedron& element : mesh.elements) {
+    const Point3& origin = mesh.points[at(element[0])];
+    volume +=
+        inner(mesh.points[at(element[1])] - origin,
+              cross(mesh.points[at(element[2])] - origin, mesh.points[at(element[3])] - origin)) /
+        6.0;
+  }
+  for (std::size_t t = 0; mesh.thickness > 0.0 && t < mesh.surface.size(); ++t) {
+    const auto& [a, b, c] = mesh.surface[t];
+    const Point3& origin = mesh.points[at(a)];
+    volume += 0.5 * mesh.thickness *
+              length(cross(mesh.points[at(b)] - origin, mesh.points[at(c)] - origin));
+  }
+  return material.density * volume;
 }
 
 }  // namespace
@@ -199,8 +263,17 @@ SolidMatrices solid_matrices(const SolidMesh& mesh, const SolidMaterial& materia
       node.push_back(static_cast<int>(i));
     }
   }
-  SolidMatrices matrices{pattern_of(mesh, row_of, static_cast<int>(node.size())), {}, node};
+  const int rows = static_cast<int>(node.size());
+  const bool is_shell = mesh.thickness > 0.0;
+  SolidMatrices matrices{is_shell ? pattern_of(shell_nodes(mesh), row_of, rows)
+                                  : pattern_of(mesh.elements, row_of, rows),
+                         {},
+                         node};
   matrices.stiffness.assign(matrices.mass.row.size(), NodeBlock{});
+  if (is_shell) {
+    assemble_shell(mesh, material, row_of, matrices, progress);
+    return matrices;
+  }
   const double lambda = material.young * material.poisson /
                         ((1.0 + material.poisson) * (1.0 - 2.0 * material.poisson));
   const double mu = material.young / (2.0 * (1.0 + material.poisson));
@@ -314,13 +387,7 @@ Result<SolidModes> find_solid_modes(const SolidMesh& mesh, const SolidMaterial& 
   if (at(modes.rigid) >= pairs->values.size()) {
     return Error{"no part of it can bend"};
   }
-  for (const QuadraticTetrahedron& element : mesh.elements) {
-    const Point3& origin = mesh.points[at(element[0])];
-    modes.mass +=
-        material.density / 6.0 *
-        inner(mesh.points[at(element[1])] - origin,
-              cross(mesh.points[at(element[2])] - origin, mesh.points[at(element[3])] - origin));
-  }
+  modes.mass = mass_of(mesh, material);
   const std::size_t found = pairs->values.size() - at(modes.rigid);
   const std::size_t kept = std::min(found, at(count));
   const std::size_t size = pairs->vectors.rows();

@@ -4,14 +4,19 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <map>
 #include <numbers>
+#include <set>
 #include <unordered_map>
 #include <utility>
+
+#include "core/groups.h"
 
 namespace ressort::solids {
 namespace {
 
 constexpr double weld_share = 1e-6;      // Welding distance, relative to the solid's size.
+constexpr double hole_share = 1.0;       // Longest hole that is closed, likewise.
 constexpr std::size_t shown_edges = 12;  // Most open edges named in an error.
 
 // Maps each point to the first point within `distance`, by a grid of cells of that width.
@@ -62,13 +67,22 @@ struct EdgeUse {
   bool is_of(const EdgeUse& other) const { return low == other.low && high == other.high; }
 };
 
-std::vector<EdgeUse> edges_of(const std::vector<Triangle>& triangles) {
+// The edges of a surface, by the number of their triangles.
+struct Seams {
+  std::vector<std::array<EdgeUse, 2>> pairs;  // Uses that continue each other.
+  std::vector<EdgeUse> open;                  // One triangle.
+  std::vector<EdgeUse> crowded;               // Three triangles, five and so on.
+};
+
+// A sheet continues across every edge with several triangles. In a solid, each forward use
+// continues a backward one.
+Seams find_seams(const Surface& surface, bool is_sheet) {
   std::vector<EdgeUse> edges;
-  edges.reserve(3 * triangles.size());
-  for (std::size_t t = 0; t < triangles.size(); ++t) {
+  edges.reserve(3 * surface.triangles.size());
+  for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
     for (std::size_t i = 0; i < 3; ++i) {
-      const int from = triangles[t][i];
-      const int to = triangles[t][(i + 1) % 3];
+      const int from = surface.triangles[t][i];
+      const int to = surface.triangles[t][(i + 1) % 3];
       edges.push_back({std::min(from, to), std::max(from, to), static_cast<int>(t), from < to});
     }
   }
@@ -76,176 +90,303 @@ std::vector<EdgeUse> edges_of(const std::vector<Triangle>& triangles) {
     return std::pair(std::pair(a.low, a.high), a.triangle) <
            std::pair(std::pair(b.low, b.high), b.triangle);
   });
-  return edges;
-}
-
-// Returns a description of the open edges; empty if every edge belongs to two triangles.
-std::string open_edges(const Surface& surface, const std::vector<EdgeUse>& edges) {
-  std::string open;
-  std::string crowded;
-  std::size_t open_count = 0;
-  std::size_t crowded_count = 0;
-  for (std::size_t i = 0; i < edges.size();) {
-    std::size_t end = i;
+  Seams seams;
+  for (std::size_t i = 0, end = 0; i < edges.size(); i = end) {
     while (end < edges.size() && edges[end].is_of(edges[i])) {
       ++end;
     }
     const std::size_t uses = end - i;
-    if (uses != 2) {
-      std::size_t& count = uses < 2 ? open_count : crowded_count;
-      if (++count <= shown_edges) {
-        (uses < 2 ? open : crowded) += "\n  " + to_string(surface.points[at(edges[i].low)]) +
-                                       " to " + to_string(surface.points[at(edges[i].high)]) +
-                                       (uses < 2 ? "" : ": " + std::to_string(uses) + " triangles");
+    if (uses == 1) {
+      seams.open.push_back(edges[i]);
+    } else if (uses % 2 == 1) {
+      seams.crowded.push_back(edges[i]);
+    } else if (uses > 2) {
+      for (std::size_t k = i; k + 1 < end; k += 2) {
+        const auto other =
+            std::find_if(edges.begin() + static_cast<std::ptrdiff_t>(k) + 1,
+                         edges.begin() + static_cast<std::ptrdiff_t>(end),
+                         [&](const EdgeUse& use) { return use.is_forward != edges[k].is_forward; });
+        if (other != edges.begin() + static_cast<std::ptrdiff_t>(end)) {
+          std::swap(edges[k + 1], *other);
+        }
       }
     }
-    i = end;
+    for (std::size_t k = i; k + 1 < end; k += is_sheet ? 1 : 2) {
+      seams.pairs.push_back({edges[k], edges[k + 1]});
+    }
   }
-  const auto describe = [](std::size_t count, const char* what, const std::string& list) {
-    return count == 0 ? std::string()
-                      : std::to_string(count) + (count == 1 ? " edge" : " edges") + what + list +
-                            (count > shown_edges
-                                 ? "\n  and " + std::to_string(count - shown_edges) + " more"
-                                 : "");
-  };
-  const std::string first =
-      describe(open_count, " with a triangle on one side only, in metres:", open);
-  const std::string second =
-      describe(crowded_count, " with more than two triangles, in metres:", crowded);
-  return first + (first.empty() || second.empty() ? "" : "\n") + second;
+  return seams;
 }
 
-// Numbers the shells and orients the triangles of each consistently. Returns false for a surface
+// Returns a description of the edges that do not continue; empty if every edge does.
+std::string open_edges(const Surface& surface, const Seams& seams) {
+  std::string text;
+  for (const auto& [edges, what] :
+       {std::pair(&seams.open, " with a triangle on one side only, in metres:"),
+        std::pair(&seams.crowded, " with an odd number of triangles, in metres:")}) {
+    if (edges->empty()) {
+      continue;
+    }
+    text += (text.empty() ? "" : "\n") + std::to_string(edges->size()) +
+            (edges->size() == 1 ? " edge" : " edges") + what;
+    for (std::size_t i = 0; i < std::min(edges->size(), shown_edges); ++i) {
+      text += "\n  " + to_string(surface.points[at((*edges)[i].low)]) + " to " +
+              to_string(surface.points[at((*edges)[i].high)]);
+    }
+    text += edges->size() > shown_edges
+                ? "\n  and " + std::to_string(edges->size() - shown_edges) + " more"
+                : "";
+  }
+  return text;
+}
+
+// Closes each loop of open edges that is short against the surface, with a fan of triangles around
+// its middle.
+void close_holes(Surface& surface, const std::vector<EdgeUse>& open, Repairs& repairs) {
+  Groups groups(surface.points.size());
+  for (const EdgeUse& edge : open) {
+    groups.join(static_cast<std::uint32_t>(edge.low), static_cast<std::uint32_t>(edge.high));
+  }
+  struct Loop {
+    double around = 0.0;  // m
+    Point3 sum{};
+    double points = 0.0;
+    int middle = -1;
+  };
+  std::map<std::uint32_t, Loop> loops;
+  const auto loop_of = [&](const EdgeUse& edge) -> Loop& {
+    return loops[groups.find(static_cast<std::uint32_t>(edge.low))];
+  };
+  for (const EdgeUse& edge : open) {
+    const Point3& low = surface.points[at(edge.low)];
+    const Point3& high = surface.points[at(edge.high)];
+    Loop& loop = loop_of(edge);
+    loop.around += length(high - low);
+    loop.sum = loop.sum + low + high;
+    loop.points += 2.0;
+  }
+  const double size = box_around(surface.points).diagonal();
+  for (auto& [group, loop] : loops) {
+    if (loop.around <= hole_share * size) {
+      loop.middle = static_cast<int>(surface.points.size());
+      surface.points.push_back(1.0 / loop.points * loop.sum);
+      ++repairs.holes;
+      repairs.longest_hole = std::max(repairs.longest_hole, loop.around / size);
+    }
+  }
+  for (const EdgeUse& edge : open) {
+    if (const int middle = loop_of(edge).middle; middle >= 0) {
+      surface.triangles.push_back(edge.is_forward ? Triangle{edge.high, edge.low, middle}
+                                                  : Triangle{edge.low, edge.high, middle});
+    }
+  }
+}
+
+// A surface with a number for each triangle: the part that it belongs to.
+struct Parts {
+  std::vector<int> part;
+  int count = 0;
+};
+
+// Numbers the parts and orients the triangles of each consistently. Returns false for a surface
 // that cannot be oriented.
-bool turn_alike(std::vector<Triangle>& triangles, const std::vector<EdgeUse>& edges,
-                ClosedSurface& closed) {
+bool turn_alike(std::vector<Triangle>& triangles, const Seams& seams, Parts& parts) {
   struct Neighbour {
     int triangle;
     bool is_alike;
   };
   std::vector<std::vector<Neighbour>> beside(triangles.size());
-  for (std::size_t i = 0; i + 1 < edges.size(); i += 2) {
-    const bool is_alike = edges[i].is_forward != edges[i + 1].is_forward;
-    beside[at(edges[i].triangle)].push_back({edges[i + 1].triangle, is_alike});
-    beside[at(edges[i + 1].triangle)].push_back({edges[i].triangle, is_alike});
+  for (const auto& [one, other] : seams.pairs) {
+    const bool is_alike = one.is_forward != other.is_forward;
+    beside[at(one.triangle)].push_back({other.triangle, is_alike});
+    beside[at(other.triangle)].push_back({one.triangle, is_alike});
   }
-  closed.shell.assign(triangles.size(), -1);
-  closed.shells = 0;
+  parts.part.assign(triangles.size(), -1);
+  bool has_two_sides = true;
   std::vector<char> is_turned(triangles.size(), 0);
   std::vector<int> waiting;
   for (std::size_t seed = 0; seed < triangles.size(); ++seed) {
-    if (closed.shell[seed] >= 0) {
+    if (parts.part[seed] >= 0) {
       continue;
     }
-    closed.shell[seed] = closed.shells;
+    parts.part[seed] = parts.count;
     waiting.assign(1, static_cast<int>(seed));
     while (!waiting.empty()) {
       const int triangle = waiting.back();
       waiting.pop_back();
       for (const Neighbour& next : beside[at(triangle)]) {
         const char wanted = static_cast<char>(is_turned[at(triangle)] ^ (next.is_alike ? 0 : 1));
-        if (closed.shell[at(next.triangle)] < 0) {
-          closed.shell[at(next.triangle)] = closed.shells;
+        if (parts.part[at(next.triangle)] < 0) {
+          parts.part[at(next.triangle)] = parts.count;
           is_turned[at(next.triangle)] = wanted;
           waiting.push_back(next.triangle);
-        } else if (is_turned[at(next.triangle)] != wanted) {
-          return false;
+        } else {
+          has_two_sides = has_two_sides && is_turned[at(next.triangle)] == wanted;
         }
       }
     }
-    ++closed.shells;
+    ++parts.count;
   }
   for (std::size_t t = 0; t < triangles.size(); ++t) {
     if (is_turned[t] != 0) {
       std::swap(triangles[t][1], triangles[t][2]);
     }
   }
-  return true;
+  return has_two_sides;
 }
 
-// Returns the winding number of a shell around a point: its solid angle over 4 pi (van Oosterom and
-// Strackee 1983).
-double windings(const ClosedSurface& closed, int shell, const Point3& point) {
-  double sum = 0.0;
-  for (std::size_t t = 0; t < closed.surface.triangles.size(); ++t) {
-    if (closed.shell[t] != shell) {
+double area_of(const Surface& surface, const Triangle& triangle) {
+  const Point3& a = surface.points[at(triangle[0])];
+  return 0.5 *
+         length(cross(surface.points[at(triangle[1])] - a, surface.points[at(triangle[2])] - a));
+}
+
+std::size_t largest_part(const Surface& surface, const Parts& parts) {
+  std::vector<double> area(at(parts.count), 0.0);
+  for (std::size_t t = 0; t < parts.part.size(); ++t) {
+    area[at(parts.part[t])] += area_of(surface, surface.triangles[t]);
+  }
+  return static_cast<std::size_t>(std::max_element(area.begin(), area.end()) - area.begin());
+}
+
+// Welds points within 1e-6 of the size, and drops repeated triangles, those without area and unused
+// points.
+Result<Surface> tidied(const Surface& given, Repairs& repairs, const Progress& progress) {
+  const double size = box_around(given.points).diagonal();
+  if (!(size > 0.0)) {
+    return Error{"all of its points coincide"};
+  }
+  const std::vector<int> same = weld(given.points, weld_share * size);
+  progress.spend(64 * given.points.size());
+  Surface tidy;
+  std::vector<int> renumbered(given.points.size(), -1);
+  std::set<Triangle> seen;
+  for (const Triangle& triangle : given.triangles) {
+    Triangle corners{same[at(triangle[0])], same[at(triangle[1])], same[at(triangle[2])]};
+    Triangle sorted = corners;
+    std::sort(sorted.begin(), sorted.end());
+    if (sorted[0] == sorted[1] || sorted[1] == sorted[2] || !seen.insert(sorted).second) {
+      ++repairs.left_out;
       continue;
     }
-    const Triangle& triangle = closed.surface.triangles[t];
-    const Point3 a = closed.surface.points[at(triangle[0])] - point;
-    const Point3 b = closed.surface.points[at(triangle[1])] - point;
-    const Point3 c = closed.surface.points[at(triangle[2])] - point;
-    const double la = length(a);
-    const double lb = length(b);
-    const double lc = length(c);
-    sum += std::atan2(inner(a, cross(b, c)),
-                      la * lb * lc + inner(a, b) * lc + inner(b, c) * la + inner(c, a) * lb);
+    for (int& corner : corners) {
+      int& number = renumbered[at(corner)];
+      if (number < 0) {
+        number = static_cast<int>(tidy.points.size());
+        tidy.points.push_back(given.points[at(corner)]);
+      }
+      corner = number;
+    }
+    tidy.triangles.push_back(corners);
   }
-  return sum / (2.0 * std::numbers::pi);
+  for (std::size_t i = 0; i < same.size(); ++i) {
+    repairs.welded += same[i] != static_cast<int>(i) ? 1 : 0;
+  }
+  if (tidy.triangles.empty()) {
+    return Error{"its triangles have no area"};
+  }
+  return tidy;
 }
 
-void turn_shell(ClosedSurface& closed, int shell) {
-  for (std::size_t t = 0; t < closed.surface.triangles.size(); ++t) {
-    if (closed.shell[t] == shell) {
-      std::swap(closed.surface.triangles[t][1], closed.surface.triangles[t][2]);
+// Drops the triangles of some parts.
+void keep_parts(Surface& surface, Parts& parts, const std::vector<char>& is_kept,
+                Repairs& repairs) {
+  const auto dropped = std::count(is_kept.begin(), is_kept.end(), 0);
+  if (dropped == 0) {
+    return;
+  }
+  repairs.parts += static_cast<std::size_t>(dropped);
+  double whole = 0.0;
+  double kept_area = 0.0;
+  Surface kept{surface.points, {}};
+  std::vector<int> part;
+  for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
+    const double area = area_of(surface, surface.triangles[t]);
+    whole += area;
+    if (is_kept[at(parts.part[t])] != 0) {
+      kept_area += area;
+      kept.triangles.push_back(surface.triangles[t]);
+      part.push_back(parts.part[t]);
     }
+  }
+  repairs.parts_area = 1.0 - (1.0 - repairs.parts_area) * kept_area / whole;
+  Repairs nothing;
+  surface = *tidied(kept, nothing, Progress());
+  parts.part = part;
+}
+
+// Drops the parts that are open, if the largest one is closed.
+void drop_open_parts(Surface& surface, Seams& seams, Repairs& repairs) {
+  Parts parts;
+  std::vector<Triangle> turned = surface.triangles;
+  turn_alike(turned, find_seams(surface, true), parts);
+  std::vector<char> is_kept(at(parts.count), 1);
+  for (const auto* edges : {&seams.open, &seams.crowded}) {
+    for (const EdgeUse& edge : *edges) {
+      is_kept[at(parts.part[at(edge.triangle)])] = 0;
+    }
+  }
+  if (is_kept[largest_part(surface, parts)] != 0) {
+    keep_parts(surface, parts, is_kept, repairs);
+    seams = find_seams(surface, false);
   }
 }
 
-// Puts the outer shell first, facing outwards, and cavities after it, facing inwards. Returns an
-// error if there are several bodies.
-Result<Done> sort_shells(ClosedSurface& closed, const Progress& progress) {
-  constexpr int most_shells = 64;
-  if (closed.shells > most_shells) {
-    return Error{"its surface has " + std::to_string(closed.shells) +
-                 " separate parts; a body must be one part"};
+// Turns the largest part outwards and the cavities in it inwards, and drops all other parts. The
+// largest part is the first one afterwards. `read` are the triangles as they were read.
+void keep_one_body(Surface& surface, Parts& parts, const std::vector<Triangle>& read,
+                   Repairs& repairs, const Progress& progress) {
+  const std::size_t count = at(parts.count);
+  std::vector<Surface> alone(count, Surface{surface.points, {}});
+  for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
+    alone[at(parts.part[t])].triangles.push_back(surface.triangles[t]);
   }
-  std::vector<double> volume(at(closed.shells), 0.0);
-  std::vector<Point3> corner(at(closed.shells));
-  for (std::size_t t = 0; t < closed.surface.triangles.size(); ++t) {
-    const Triangle& triangle = closed.surface.triangles[t];
-    const Point3& a = closed.surface.points[at(triangle[0])];
-    const std::size_t shell = at(closed.shell[t]);
-    volume[shell] += inner(
-        a, cross(closed.surface.points[at(triangle[1])], closed.surface.points[at(triangle[2])]));
-    corner[shell] = a;
+  std::vector<double> volume;
+  for (const Surface& part : alone) {
+    volume.push_back(six_volumes(part));
   }
-  for (int shell = 0; shell < closed.shells; ++shell) {
-    if (volume[at(shell)] < 0.0) {
-      turn_shell(closed, shell);
-    }
-  }
-  const auto largest =
+  const auto outer = static_cast<std::size_t>(
       std::max_element(volume.begin(), volume.end(),
                        [](double a, double b) { return std::abs(a) < std::abs(b); }) -
-      volume.begin();
-  const int outer = static_cast<int>(largest);
-  for (int shell = 0; shell < closed.shells; ++shell) {
-    if (shell == outer) {
-      continue;
-    }
-    progress.spend(16 * closed.surface.triangles.size());
-    int around = 0;
-    for (int other = 0; other < closed.shells; ++other) {
-      if (other != shell) {
-        around += windings(closed, other, corner[at(shell)]) > 0.5 ? 1 : 0;
+      volume.begin());
+  // A part inside another one has all its corners there; a few of them tell.
+  const auto is_within = [&](std::size_t part, std::size_t other) {
+    const auto& triangles = alone[part].triangles;
+    for (std::size_t i = 0; i < triangles.size(); i += 1 + triangles.size() / 8) {
+      progress.spend(16 * alone[other].triangles.size());
+      if (std::abs(windings(alone[other], surface.points[at(triangles[i][0])])) < 0.5) {
+        return false;
       }
     }
-    if (around != 1) {
-      return Error{"it has more than one part: the part with a corner at " +
-                   to_string(corner[at(shell)]) +
-                   " m is not connected to the rest; a body must be one part"};
+    return true;
+  };
+  std::vector<char> is_inside(count, 0);
+  for (std::size_t part = 0; part < count; ++part) {
+    is_inside[part] = part == outer || is_within(part, outer) ? 1 : 0;
+  }
+  std::vector<char> is_kept = is_inside;
+  for (std::size_t part = 0; part < count; ++part) {
+    for (std::size_t other = 0; other < count && part != outer && is_kept[part] != 0; ++other) {
+      const bool is_wall = other != part && other != outer && is_inside[other] != 0;
+      is_kept[part] = is_wall && is_within(part, other) ? 0 : 1;
     }
   }
-  for (int shell = 0; shell < closed.shells; ++shell) {
-    if (shell != outer) {
-      turn_shell(closed, shell);
+  std::vector<int> number(count, 0);
+  parts.count = 1;
+  for (std::size_t part = 0; part < count; ++part) {
+    number[part] = part != outer && is_kept[part] != 0 ? parts.count++ : 0;
+  }
+  for (std::size_t t = 0; t < read.size(); ++t) {
+    const std::size_t part = at(parts.part[t]);
+    if ((volume[part] < 0.0) == (part == outer)) {
+      std::swap(surface.triangles[t][1], surface.triangles[t][2]);
     }
+    repairs.turned += is_kept[part] != 0 && read[t] != surface.triangles[t] ? 1 : 0;
   }
-  for (int& shell : closed.shell) {
-    shell = shell == outer ? 0 : shell == 0 ? outer : shell;
+  keep_parts(surface, parts, is_kept, repairs);
+  for (int& part : parts.part) {
+    part = number[at(part)];
   }
-  return Done{};
 }
 
 }  // namespace
@@ -261,6 +402,21 @@ double six_volumes(const Surface& surface) {
                  cross(surface.points[at(triangle[1])], surface.points[at(triangle[2])]));
   }
   return sum;
+}
+
+double windings(const Surface& surface, const Point3& point) {
+  double sum = 0.0;
+  for (const Triangle& triangle : surface.triangles) {
+    const Point3 a = surface.points[at(triangle[0])] - point;
+    const Point3 b = surface.points[at(triangle[1])] - point;
+    const Point3 c = surface.points[at(triangle[2])] - point;
+    const double la = length(a);
+    const double lb = length(b);
+    const double lc = length(c);
+    sum += std::atan2(inner(a, cross(b, c)),
+                      la * lb * lc + inner(a, b) * lc + inner(b, c) * la + inner(c, a) * lb);
+  }
+  return sum / (2.0 * std::numbers::pi);
 }
 
 Box3 box_around(const std::vector<Point3>& points) {
@@ -290,59 +446,56 @@ Surface scaled(Surface surface, double metres_per_unit) {
   return surface;
 }
 
-Result<ClosedSurface> close_surface(const Surface& surface, const Progress& progress) {
-  const double size = box_around(surface.points).diagonal();
-  if (!(size > 0.0)) {
-    return Error{"all of its points coincide"};
-  }
-  const std::vector<int> same = weld(surface.points, weld_share * size);
-  progress.spend(64 * surface.points.size());
+Result<ClosedSurface> close_surface(const Surface& given, const Progress& progress) {
   ClosedSurface closed;
-  std::vector<int> renumbered(surface.points.size(), -1);
-  for (const Triangle& triangle : surface.triangles) {
-    const Triangle corners{same[at(triangle[0])], same[at(triangle[1])], same[at(triangle[2])]};
-    if (corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0]) {
-      ++closed.left_out;
-      continue;
-    }
-    Triangle kept{};
-    for (std::size_t i = 0; i < 3; ++i) {
-      int& number = renumbered[at(corners[i])];
-      if (number < 0) {
-        number = static_cast<int>(closed.surface.points.size());
-        closed.surface.points.push_back(surface.points[at(corners[i])]);
-      }
-      kept[i] = number;
-    }
-    closed.surface.triangles.push_back(kept);
+  Surface& surface = closed.surface;
+  Repairs& repairs = closed.repairs;
+  auto tidy = tidied(given, repairs, progress);
+  if (!tidy) {
+    return tidy.error();
   }
-  for (std::size_t i = 0; i < same.size(); ++i) {
-    closed.welded += same[i] != static_cast<int>(i) ? 1 : 0;
-  }
-  const std::vector<EdgeUse> edges = edges_of(closed.surface.triangles);
-  progress.spend(64 * edges.size());
-  if (const std::string open = open_edges(closed.surface, edges); !open.empty()) {
+  surface = *std::move(tidy);
+  close_holes(surface, find_seams(surface, false).open, repairs);
+  Seams seams = find_seams(surface, false);
+  drop_open_parts(surface, seams, repairs);
+  progress.spend(400 * surface.triangles.size());
+  if (const std::string open = open_edges(surface, seams); !open.empty()) {
     return Error{"the surface is not closed: " + open};
   }
-  const std::vector<Triangle> given = closed.surface.triangles;
-  if (!turn_alike(closed.surface.triangles, edges, closed)) {
+  const std::vector<Triangle> read = surface.triangles;
+  Parts parts;
+  if (!turn_alike(surface.triangles, seams, parts)) {
     return Error{"the surface is one-sided (like a Möbius strip), so it encloses no volume"};
   }
-  if (auto sorted = sort_shells(closed, progress); !sorted) {
-    return sorted.error();
-  }
-  for (std::size_t t = 0; t < given.size(); ++t) {
-    closed.turned += given[t] != closed.surface.triangles[t] ? 1 : 0;
-  }
-  closed.volume = six_volumes(closed.surface) / 6.0;
-  const Point3 sides =
-      box_around(closed.surface.points).high - box_around(closed.surface.points).low;
+  keep_one_body(surface, parts, read, repairs, progress);
+  closed.shell = parts.part;
+  closed.shells = parts.count;
+  closed.volume = six_volumes(surface) / 6.0;
+  const Box3 box = box_around(surface.points);
+  const Point3 sides = box.high - box.low;
+  const double size = box.diagonal();
   if (!(closed.volume > 1e-9 * size * size * size) ||
       *std::min_element(sides.begin(), sides.end()) <= 0.0) {
     return Error{"the surface encloses no volume: its volume is " + std::to_string(closed.volume) +
                  " m^3"};
   }
   return closed;
+}
+
+Result<Sheet> repaired_sheet(const Surface& given, const Progress& progress) {
+  Sheet sheet;
+  auto tidy = tidied(given, sheet.repairs, progress);
+  if (!tidy) {
+    return tidy.error();
+  }
+  sheet.surface = *std::move(tidy);
+  Parts parts;
+  turn_alike(sheet.surface.triangles, find_seams(sheet.surface, true), parts);
+  progress.spend(400 * sheet.surface.triangles.size());
+  std::vector<char> is_kept(at(parts.count), 0);
+  is_kept[largest_part(sheet.surface, parts)] = 1;
+  keep_parts(sheet.surface, parts, is_kept, sheet.repairs);
+  return sheet;
 }
 
 }  // namespace ressort::solids

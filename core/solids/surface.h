@@ -63,27 +63,50 @@ SurfaceFormat surface_format(std::string_view bytes);
 // Reads a file in any of these formats. Ignores a byte-order mark.
 Result<Surface> read_surface(std::string_view bytes);
 
+// The changes that made a surface usable.
+struct Repairs {
+  std::size_t welded = 0;     // Points merged with another one.
+  std::size_t left_out = 0;   // Triangles without area, and repeated ones.
+  std::size_t turned = 0;     // Triangles that faced inwards and were flipped.
+  std::size_t holes = 0;      // Loops of open edges that were closed.
+  double longest_hole = 0.0;  // Length of the longest of these loops, relative to the size.
+  std::size_t parts = 0;      // Separate parts that were left out.
+  double parts_area = 0.0;    // Their share of the area.
+};
+
 // A surface whose shells are all closed.
 struct ClosedSurface {
   Surface surface;
   // [triangle] Shell number; 0 is the outer shell, the others are cavities.
   std::vector<int> shell;
   int shells = 1;
-  std::size_t welded = 0;    // Points merged with another one.
-  std::size_t turned = 0;    // Triangles that faced inwards and were flipped.
-  std::size_t left_out = 0;  // Triangles without area.
-  double volume = 0.0;       // m^3
+  Repairs repairs;
+  double volume = 0.0;  // m^3
 };
 
-// Welds points within 1e-6 of the solid's size and orients the triangles outwards. Returns an error
-// for edges that do not belong to two triangles (named by their ends in metres), for a surface that
-// cannot be oriented, that is flat, or that holds several bodies. O(n log n)
-Result<ClosedSurface> close_surface(const Surface& surface, const Progress& progress);
+// Welds points within 1e-6 of the solid's size, closes holes whose edge is at most as long as the
+// solid, orients the triangles outwards, and keeps the largest part with its cavities. Returns an
+// error for edges that are still open (named by their ends in metres), and for a surface that
+// cannot be oriented or that is flat. O(n log n)
+Result<ClosedSurface> close_surface(const Surface& given, const Progress& progress);
+
+// The middle surface of a shell: one part, open or closed. Edges may have any number of triangles.
+struct Sheet {
+  Surface surface;
+  Repairs repairs;
+};
+
+// Welds points likewise, and keeps the largest part. O(n log n)
+Result<Sheet> repaired_sheet(const Surface& given, const Progress& progress);
 
 Surface scaled(Surface surface, double metres_per_unit);
 
 // Returns six times the enclosed volume; negative if the triangles face inwards.
 double six_volumes(const Surface& surface);
+
+// Returns the winding number of a surface around a point, its solid angle over 4 pi: 1 inside, 0
+// outside (van Oosterom and Strackee 1983).
+double windings(const Surface& surface, const Point3& point);
 
 // The axis-aligned bounding box.
 struct Box3 {

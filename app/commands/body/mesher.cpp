@@ -19,7 +19,6 @@
 #include "app/commands/output.h"
 #include "app/session/files.h"
 #include "core/model/language/expression.h"
-#include "core/progress.h"
 
 namespace ressort::commands {
 namespace {
@@ -61,15 +60,21 @@ std::string last_words(const std::string& log) {
   return text.empty() ? "no messages" : "its last messages:\n" + text;
 }
 
-// Runs a program in the folder, with its output in the file "log" there.
-Result<Done> run(std::vector<std::string> words, const TemporaryFolder& folder, double limit_s,
-                 const std::function<bool()>& should_continue) {
+// A program that meshes, and what limits it.
+struct Work {
+  const TemporaryFolder& folder;  // The program runs there, with its output in the file "log".
+  double limit_s;
+  Clock::time_point end;
+  const Progress::Callback& should_continue;
+};
+
+Result<Done> run(std::vector<std::string> words, const Work& work) {
   std::vector<char*> arguments;
   for (std::string& word : words) {
     arguments.push_back(word.data());
   }
   arguments.push_back(nullptr);
-  const std::string log = folder.file("log");
+  const std::string log = work.folder.file("log");
   const pid_t child = fork();
   if (child < 0) {
     return Error{"cannot start " + words[0] + ": " +
@@ -80,7 +85,7 @@ Result<Done> run(std::vector<std::string> words, const TemporaryFolder& folder, 
     prctl(PR_SET_PDEATHSIG, SIGKILL);  // the child ends with this process
     const int out = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
     const int in = open("/dev/null", O_RDONLY | O_CLOEXEC);
-    if (out >= 0 && in >= 0 && chdir(folder.path().c_str()) == 0) {
+    if (out >= 0 && in >= 0 && chdir(work.folder.path().c_str()) == 0) {
       dup2(in, STDIN_FILENO);
       dup2(out, STDOUT_FILENO);
       dup2(out, STDERR_FILENO);
@@ -88,7 +93,6 @@ Result<Done> run(std::vector<std::string> words, const TemporaryFolder& folder, 
     }
     _exit(127);
   }
-  const auto end = Clock::now() + milliseconds(static_cast<std::int64_t>(1000.0 * limit_s));
   int status = 0;
   for (;;) {
     const pid_t ended = waitpid(child, &status, WNOHANG);
@@ -98,14 +102,15 @@ Result<Done> run(std::vector<std::string> words, const TemporaryFolder& folder, 
     if (ended < 0 && errno != EINTR) {
       return Error{"lost contact with " + words[0]};
     }
-    const bool is_late = Clock::now() > end;
-    if (is_late || !should_continue()) {
+    const auto left = std::chrono::duration_cast<std::chrono::seconds>(work.end - Clock::now());
+    const bool is_late = Clock::now() > work.end;
+    if (is_late || !work.should_continue("meshing with " + words[0] + ", at most " +
+                                         std::to_string(left.count()) + " s")) {
       kill(-child, SIGKILL);
       kill(child, SIGKILL);
       while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
       }
-      return Error{is_late ? words[0] + " was stopped after " + print_number(limit_s) +
-                                 " s; use a coarser mesh"
+      return Error{is_late ? words[0] + " was stopped after " + print_number(work.limit_s) + " s"
                            : stopped};
     }
     std::this_thread::sleep_for(milliseconds(5));
@@ -132,27 +137,26 @@ std::string gmsh_script(double edge, bool makes_surface_anew) {
 
 using Fill = std::function<Result<TetrahedronMesh>(double edge)>;
 
-Result<TetrahedronMesh> by_gmsh(const ClosedSurface& closed, double edge,
-                                const TemporaryFolder& folder, const MeshOrder& order,
-                                const std::function<bool()>& should_continue) {
+Result<TetrahedronMesh> by_gmsh(const ClosedSurface& closed, double edge, const Work& work) {
   Error first;
   for (const bool anew : {true, false}) {
     for (const auto& [name, text] : {std::pair("surface.stl", as_stl(closed)),
                                      std::pair("body.geo", gmsh_script(edge, anew))}) {
-      if (auto written = write_text(folder.file(name), text, Existing::replace); !written) {
+      if (auto written = write_text(work.folder.file(name), text, Existing::replace); !written) {
         return written.error();
       }
     }
-    const auto ran = run({"gmsh", "-3", "body.geo", "-o", "body.mesh", "-v", "2", "-nt", "1"},
-                         folder, order.limit_s, should_continue);
+    const auto ran =
+        run({"gmsh", "-3", "body.geo", "-o", "body.mesh", "-v", "2", "-nt", "1"}, work);
     if (ran) {
-      const auto text = read_bytes(folder.file("body.mesh"), max_mesh_bytes);
+      const auto text = read_bytes(work.folder.file("body.mesh"), max_mesh_bytes);
       auto mesh = text ? read_medit(*text) : Result<TetrahedronMesh>(text.error());
       if (mesh && !mesh->tetrahedra.empty()) {
         return mesh;
       }
-      first = anew || mesh ? Error{"gmsh produced no tetrahedra; " + last_words(folder.file("log"))}
-                           : mesh.error();
+      first = anew || mesh
+                  ? Error{"gmsh produced no tetrahedra; " + last_words(work.folder.file("log"))}
+                  : mesh.error();
     } else if (ran.error().message == stopped) {
       return ran.error();
     } else if (anew || first.message.empty()) {
@@ -162,22 +166,20 @@ Result<TetrahedronMesh> by_gmsh(const ClosedSurface& closed, double edge,
   return first;
 }
 
-Result<TetrahedronMesh> by_tetgen(const ClosedSurface& closed, double edge,
-                                  const TemporaryFolder& folder, const MeshOrder& order,
-                                  const std::function<bool()>& should_continue) {
-  if (auto written = write_text(folder.file("body.smesh"), as_smesh(closed), Existing::replace);
+Result<TetrahedronMesh> by_tetgen(const ClosedSurface& closed, double edge, const Work& work) {
+  if (auto written =
+          write_text(work.folder.file("body.smesh"), as_smesh(closed), Existing::replace);
       !written) {
     return written.error();
   }
   char switches[64];  // TetGen cannot read exponents here
   std::snprintf(switches, sizeof switches, "-pq1.4a%.24fgNEFQ", edge * edge * edge / 8.5);
-  if (auto ran = run({"tetgen", switches, "body.smesh"}, folder, order.limit_s, should_continue);
-      !ran) {
+  if (auto ran = run({"tetgen", switches, "body.smesh"}, work); !ran) {
     return ran.error();
   }
-  const auto text = read_bytes(folder.file("body.1.mesh"), max_mesh_bytes);
+  const auto text = read_bytes(work.folder.file("body.1.mesh"), max_mesh_bytes);
   return text ? read_medit(*text)
-              : Error{"tetgen produced no tetrahedra; " + last_words(folder.file("log"))};
+              : Error{"tetgen produced no tetrahedra; " + last_words(work.folder.file("log"))};
 }
 
 std::size_t unknowns_of(const TetrahedronMesh& mesh) {
@@ -221,7 +223,7 @@ void restore_volume(TetrahedronMesh& mesh, const ClosedSurface& closed) {
 }  // namespace
 
 Result<Meshed> fill_with_tetrahedra(const ClosedSurface& closed, const MeshOrder& order,
-                                    const std::function<bool()>& should_continue) {
+                                    const Progress::Callback& should_continue) {
   if (order.mesher == Mesher::automatic || order.mesher == Mesher::own) {
     if (const auto box = as_box(closed)) {
       return Meshed{oriented_box_mesh(*box, order.unknowns), "ressort, for boxes"};
@@ -230,11 +232,6 @@ Result<Meshed> fill_with_tetrahedra(const ClosedSurface& closed, const MeshOrder
       Meshed meshed{detected_ball_mesh(*ball, order.unknowns), "ressort, for balls"};
       restore_volume(meshed.mesh, closed);
       return meshed;
-    }
-    if (order.mesher == Mesher::own) {
-      return Error{
-          "not a box or a ball, the only shapes that ressort meshes itself; pass --mesher gmsh or "
-          "tetgen"};
     }
   }
   const double edge = edge_length(closed.volume, order.unknowns);
@@ -253,25 +250,36 @@ Result<Meshed> fill_with_tetrahedra(const ClosedSurface& closed, const MeshOrder
     if (!folder) {
       return folder.error();
     }
+    const Work work{*folder, order.limit_s,
+                    Clock::now() + milliseconds(static_cast<std::int64_t>(1000.0 * order.limit_s)),
+                    should_continue};
     auto mesh = fitted(edge, order.unknowns, [&](double size) {
-      return program.mesher == Mesher::gmsh
-                 ? by_gmsh(closed, size, *folder, order, should_continue)
-                 : by_tetgen(closed, size, *folder, order, should_continue);
+      return program.mesher == Mesher::gmsh ? by_gmsh(closed, size, work)
+                                            : by_tetgen(closed, size, work);
     });
     if (mesh) {
       restore_volume(*mesh, closed);
-      return Meshed{*std::move(mesh), program.name};
+      return Meshed{*std::move(mesh), program.name, failures};
     }
     if (mesh.error().message == stopped) {
       return mesh.error();
     }
     failures += (failures.empty() ? "" : "\n") + mesh.error().message;
   }
+  if (order.mesher == Mesher::own || (order.mesher == Mesher::automatic && !failures.empty())) {
+    const Progress progress(should_continue);
+    progress.stage("meshing with a grid");
+    Meshed meshed{grid_mesh(closed, order.unknowns, progress), "ressort, on a grid", failures};
+    if (!meshed.mesh.tetrahedra.empty()) {
+      restore_volume(meshed.mesh, closed);
+      return meshed;
+    }
+  }
   return Error{!failures.empty()
                    ? failures
                    : std::string(order.mesher == Mesher::automatic ? "neither gmsh nor tetgen is"
                                                                    : "the mesher is not") +
-                         " installed; install the package gmsh (boxes and balls need no mesher)"};
+                         " installed; install the package gmsh, or pass --mesher own for a grid"};
 }
 
 }  // namespace ressort::commands

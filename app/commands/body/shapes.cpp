@@ -24,7 +24,11 @@ plot::Panel shape_panel(const SolidMesh& mesh, const SolidModes& modes, std::siz
       moved[i][axis] = modes.shapes(3 * i + axis, k);
     }
     share[i] = length(moved[i]);
-    most = std::max(most, share[i]);
+  }
+  for (const Triangle& triangle : mesh.surface) {
+    for (const int corner : triangle) {
+      most = std::max(most, share[at(corner)]);
+    }
   }
   for (std::size_t i = 0; i < mesh.points.size(); ++i) {
     share[i] /= most;

@@ -17,6 +17,7 @@
 #include "app/session/files.h"
 #include "app/text.h"
 #include "core/model/language/expression.h"
+#include "core/solids/shell.h"
 
 namespace ressort::commands {
 namespace {
@@ -112,18 +113,50 @@ Result<MaterialChoice> choose_material(const SolidBodyOptions& options) {
   return MaterialChoice{material, damping};
 }
 
-Result<ClosedSurface> read_solid(const SolidBodyOptions& options, const Progress& progress) {
+// Reports what was changed in the surface.
+void print_repairs(const std::string& file, const Repairs& repairs) {
+  const auto percent = [](double share) { return digits(100.0 * share, 2) + " %"; };
+  for (const auto& [count, said] :
+       {std::pair(repairs.welded,
+                  counted(repairs.welded, "point", "points") + " welded to another one"),
+        std::pair(repairs.left_out, counted(repairs.left_out, "triangle", "triangles") +
+                                        " left out: without area, or given twice"),
+        std::pair(repairs.holes, counted(repairs.holes, "hole", "holes") +
+                                     " closed; the edge of the longest has " +
+                                     percent(repairs.longest_hole) + " of the size"),
+        std::pair(repairs.turned,
+                  counted(repairs.turned, "triangle", "triangles") + " turned to the other side"),
+        std::pair(repairs.parts, counted(repairs.parts, "separate part", "separate parts") +
+                                     " left out, with " + percent(repairs.parts_area) +
+                                     " of the surface")}) {
+    if (count > 0) {
+      print_error(file + ": " + said);
+    }
+  }
+}
+
+// The mesh of a solid or shell, and its mesher.
+struct Body {
+  SolidMesh mesh;
+  std::string by;
+};
+
+// Reads and meshes the file. Errors begin with its name.
+Result<Body> read_body(const SolidBodyOptions& options, const Progress& progress,
+                       const Progress::Callback& should_continue) {
+  const auto located = [&](const Error& error) {
+    return error.message == stopped
+               ? error
+               : Error{options.input +
+                       (error.line > 0 ? ":" + std::to_string(error.line) : std::string()) +
+                       ": error: " + error.message};
+  };
   const auto bytes = read_bytes(options.input, max_solid_bytes);
   if (!bytes) {
     return bytes.error();
   }
   progress.stage("reading the solid");
-  const auto surface = read_surface(*bytes);
-  const auto located = [&](const Error& error) {
-    return Error{options.input +
-                 (error.line > 0 ? ":" + std::to_string(error.line) : std::string()) +
-                 ": error: " + error.message};
-  };
+  auto surface = read_surface(*bytes);
   if (!surface) {
     return located(surface.error());
   }
@@ -131,11 +164,50 @@ Result<ClosedSurface> read_solid(const SolidBodyOptions& options, const Progress
     print_error("warning: " + options.input + ": ignored " +
                 counted(surface->ignored_bytes, "byte", "bytes") + " behind the last triangle");
   }
-  auto closed = close_surface(scaled(*surface, options.scale), progress);
-  if (!closed) {
-    return located(closed.error());
+  surface = scaled(*std::move(surface), options.scale);
+  if (const double size = box_around(surface->points).diagonal(); size > very_large) {
+    print_error("warning: the solid is " + digits(size, 3) +
+                " m large; for a file in millimetres, pass --scale 0.001");
   }
-  return closed;
+  const auto report = [&](const Repairs& repairs) {
+    if (!options.is_quiet) {
+      print_repairs(options.input, repairs);
+    }
+  };
+  if (options.thickness_mm > 0.0) {
+    auto sheet = repaired_sheet(*surface, progress);
+    if (!sheet) {
+      return located(sheet.error());
+    }
+    report(sheet->repairs);
+    progress.stage("meshing the shell");
+    auto mesh = shell_mesh(std::move(sheet->surface), 1e-3 * options.thickness_mm,
+                           options.mesh.unknowns, progress);
+    if (!mesh) {
+      return located(mesh.error());
+    }
+    return Body{*std::move(mesh), "ressort"};
+  }
+  const auto closed = close_surface(*surface, progress);
+  if (!closed) {
+    return located(
+        Error{closed.error().message +
+              "\nit is no solid; for a shell (a bowl, a bell, a sheet), pass --thickness "
+              "with the thickness of its wall in mm"});
+  }
+  report(closed->repairs);
+  const auto meshed = fill_with_tetrahedra(*closed, options.mesh, should_continue);
+  if (!meshed) {
+    return located(meshed.error());
+  }
+  if (!meshed->failures.empty()) {
+    print_error("warning: " + meshed->failures + "\nmeshed by " + meshed->by + " instead");
+  }
+  auto mesh = quadratic(meshed->mesh);
+  if (!mesh) {
+    return located(mesh.error());
+  }
+  return Body{*std::move(mesh), meshed->by};
 }
 
 Result<std::vector<SolidPlace>> choose_places(const SolidBodyOptions& options,
@@ -215,13 +287,16 @@ std::string header_comment(const SolidBodyOptions& options, const MaterialChoice
   const std::string loss = options.rayleigh ? "Rayleigh damping " + digits(choice.damping.a, 4) +
                                                   " 1/s, " + digits(choice.damping.b, 4) + " s"
                                             : "loss factor " + digits(choice.damping.loss, 4);
+  const std::string elements =
+      mesh.thickness > 0.0 ? std::to_string(mesh.surface.size()) + " flat triangles of a shell, " +
+                                 digits(options.thickness_mm, 4) + " mm thick,"
+                           : std::to_string(mesh.elements.size()) + " quadratic tetrahedra";
   return "# " + std::filesystem::path(options.input).filename().string() + ": " +
          digits(modes.mass, 4) + " kg of " + what + digits(material.young, 4) + " Pa, " +
          digits(material.poisson, 4) + ", " + digits(material.density, 4) + " kg/m^3; " + loss +
          "; " + (options.clamps.empty() ? "free" : "clamped") +
-         ".\n# Finite elements: " + std::to_string(mesh.elements.size()) +
-         " quadratic tetrahedra by " + by + ", " + std::to_string(mesh.unknowns()) +
-         " unknowns, residual " + digits(modes.residual, 2) +
+         ".\n# Finite elements: " + elements + " by " + by + ", " +
+         std::to_string(mesh.unknowns()) + " unknowns, residual " + digits(modes.residual, 2) +
          ".\n# Units: micrometres and newtons; M is kilograms times 1e-6 (44100/s)^2, and K "
          "newtons per\n"
          "# micrometre. A mode has its frequency in Hz, its T60 in s, and the displacement of each "
@@ -279,15 +354,15 @@ int solid_body(const SolidBodyOptions& options) {
   }
   watch_for_interrupt();
   ProgressBar bar(!options.is_quiet);
-  double share = 0.0;
-  const auto should_continue = [&](std::string_view stage) {
-    bar.show(share, std::string(stage));
+  const Progress::Callback should_continue = [&](std::string_view stage) {
+    bar.show(stage == "finding its modes"   ? 0.6
+             : stage == "reading the solid" ? 0.0
+             : stage.starts_with("meshing") ? 0.1
+                                            : 0.3,
+             std::string(stage));
     return !called_off.is_raised();
   };
-  const Progress progress([&](std::string_view stage) {
-    share = stage == "finding its modes" ? 0.6 : stage == "reading the solid" ? 0.0 : 0.3;
-    return should_continue(stage);
-  });
+  const Progress progress(should_continue);
   // Reports an error or the interruption. No file has been written in that case.
   const auto failed = [&](const Error& error) {
     if (error.message == stopped) {
@@ -297,27 +372,11 @@ int solid_body(const SolidBodyOptions& options) {
     return reject(error.message);
   };
   try {
-    const auto closed = read_solid(options, progress);
-    if (!closed) {
-      return failed(closed.error());
+    const auto body = read_body(options, progress, should_continue);
+    if (!body) {
+      return failed(body.error());
     }
-    const Box3 box = box_around(closed->surface.points);
-    if (box.diagonal() > very_large) {
-      print_error("warning: the solid is " + digits(box.diagonal(), 3) +
-                  " m large; for a file in millimetres, pass --scale 0.001");
-    }
-    share = 0.1;
-    const auto meshed =
-        fill_with_tetrahedra(*closed, options.mesh, [&] { return should_continue("meshing"); });
-    if (!meshed) {
-      return failed(Error{meshed.error().message == stopped
-                              ? stopped
-                              : options.input + ": error: " + meshed.error().message});
-    }
-    const auto mesh = quadratic(meshed->mesh);
-    if (!mesh) {
-      return failed(Error{options.input + ": error: " + mesh.error().message});
-    }
+    const SolidMesh* const mesh = &body->mesh;
     std::vector<SolidClamp> clamps;
     for (const SolidClamp& clamp : options.clamps) {
       clamps.push_back({options.scale * clamp.centre, options.scale * clamp.radius});
@@ -330,7 +389,7 @@ int solid_body(const SolidBodyOptions& options) {
     if (!modes) {
       return failed(Error{options.input + ": error: " + modes.error().message});
     }
-    const std::string header = header_comment(options, *choice, *mesh, *modes, meshed->by);
+    const std::string header = header_comment(options, *choice, *mesh, *modes, body->by);
     const std::string text =
         body_text(body_name(options.input), header, *mesh, *modes, *places, choice->damping);
     if (!options.picture.empty()) {

@@ -30,6 +30,7 @@ struct SolidBodyOptions {
   std::optional<double> poisson;                  // overrides the material
   std::optional<double> density;                  // kg/m^3
   double scale = 1.0;                             // metres per unit of the file
+  double thickness_mm = 0.0;                      // above 0: the surface is a shell
   int modes = 40;                                 // number of modes
   std::vector<PickedPlace> places;                // empty: four places far from each other
   std::optional<double> loss;                     // loss factor; overrides the material

@@ -63,7 +63,7 @@ std::vector<double> partials_of_solid(const Bell& bell) {
   const auto closed = close_surface(bell_surface(bell.profile, 80, 120), Progress());
   REQUIRE(closed);
   const auto filled = fill_with_tetrahedra(*closed, {.mesher = Mesher::gmsh, .unknowns = 90000.0},
-                                           [] { return true; });
+                                           [](std::string_view) { return true; });
   REQUIRE(filled);
   const auto mesh = quadratic(filled->mesh);
   REQUIRE(mesh);

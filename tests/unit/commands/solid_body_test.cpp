@@ -117,6 +117,39 @@ TEST_CASE("A bar becomes a body that moves like a beam", "[solid_body]") {
   CHECK(read_text(options.picture, 1 << 24)->find("1: 1286") != std::string::npos);
 }
 
+TEST_CASE("A sheet with a thickness becomes a body", "[solid_body]") {
+  const Workshop workshop;
+  SolidBodyOptions options{
+      .input = workshop.put("sheet.obj", "v 0 0 0\nv 20 0 0\nv 20 20 0\nv 0 20 0\nf 1 2 3 4\n"),
+      .output = workshop.file("sheet.mdl"),
+      .is_quiet = true,
+      .young = 2e11,
+      .poisson = 0.3,
+      .density = 7850.0,
+      .scale = 0.01,
+      .thickness_mm = 1.0,
+      .modes = 5,
+      .places = {{"corner", {0, 0, 0}, std::nullopt}, {"middle", {10, 10, 0}, std::nullopt}},
+      .loss = 0.001};
+  options.mesh.unknowns = 6000;
+  options.picture = workshop.file("sheet.svg");
+  REQUIRE(solid_body(options) == 0);
+  const WrittenBody body = read_body(options.output);
+  CHECK(body.m == Approx(0.314 * 44100.0 * 44100.0 * 1e-6).epsilon(1e-8));
+  REQUIRE(body.modes.size() == 5);
+  // A free square plate has lambda^2 = 13.468, 19.596, 24.270 and twice 34.801 (Liew, Xiang and
+  // Kitipornchai 1995).
+  const double unit = 1e-3 / (2.0 * pi * 0.04) * std::sqrt(2e11 / (12.0 * 7850.0 * (1.0 - 0.09)));
+  const double wanted[] = {13.468, 19.596, 24.270, 34.801, 34.801};
+  for (std::size_t k = 0; k < 5; ++k) {
+    CHECK(body.modes[k].frequency_hz == Approx(wanted[k] * unit).epsilon(0.01));
+  }
+  // The first mode twists the sheet about its resting middle; the third is a bowl.
+  CHECK(std::abs(body.modes[0].weights[1]) < 0.01 * std::abs(body.modes[0].weights[0]));
+  CHECK(body.modes[2].weights[1] < -0.5 * body.modes[2].weights[0]);
+  CHECK(fs::exists(options.picture));
+}
+
 TEST_CASE("A recording of a struck bar has the modes of its solid", "[solid_body]") {
   // ME-T9 requires 0.01 Hz and 0.1 %.
   const Workshop workshop;
@@ -281,13 +314,13 @@ TEST_CASE("A missing mesher gives advice, and a hanging mesher is stopped", "[so
   const Workshop workshop;
   const std::string path = std::getenv("PATH");
   const auto with_path = [&](const std::string& folders, const MeshOrder& order,
-                             const std::function<bool()>& should_continue) {
+                             const Progress::Callback& should_continue) {
     setenv("PATH", folders.c_str(), 1);
     auto meshed = fill_with_tetrahedra(bent, order, should_continue);
     setenv("PATH", path.c_str(), 1);
     return meshed;
   };
-  const auto yes = [] { return true; };
+  const auto yes = [](std::string_view) { return true; };
   const auto without = with_path(workshop.file(""), {}, yes);
   REQUIRE_FALSE(without);
   CHECK(without.error().message.find("install the package gmsh") != std::string::npos);
@@ -298,9 +331,16 @@ TEST_CASE("A missing mesher gives advice, and a hanging mesher is stopped", "[so
   const auto late = with_path(folders, {.mesher = Mesher::tetgen, .limit_s = 0.1}, yes);
   REQUIRE_FALSE(late);
   CHECK(late.error().message.find("was stopped after 0.1 s") != std::string::npos);
+  // A grid follows if every program is late.
+  workshop.put("gmsh", "#!/bin/sh\nexec sleep 60\n");
+  fs::permissions(workshop.file("gmsh"), fs::perms::owner_all);
+  const auto gridded = with_path(folders, {.unknowns = 3000.0, .limit_s = 0.1}, yes);
+  REQUIRE(gridded);
+  CHECK(gridded->by == "ressort, on a grid");
+  CHECK(gridded->failures == "gmsh was stopped after 0.1 s\ntetgen was stopped after 0.1 s");
   int looks = 0;
-  const auto called_off =
-      with_path(folders, {.mesher = Mesher::tetgen}, [&] { return ++looks < 10; });
+  const auto called_off = with_path(folders, {.mesher = Mesher::tetgen},
+                                    [&](std::string_view) { return ++looks < 10; });
   REQUIRE_FALSE(called_off);
   CHECK(called_off.error().message == stopped);
 

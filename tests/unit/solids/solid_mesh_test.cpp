@@ -29,7 +29,7 @@ TEST_CASE("meshes of boxes and balls are complete and closed", "[solid_mesh]") {
   CHECK(volume_of(*box) == Approx(6.0).epsilon(1e-12));
   const auto closed = close_surface({.points = box->points, .triangles = box->surface}, Progress());
   REQUIRE(closed);
-  CHECK(closed->turned == 0);
+  CHECK(closed->repairs.turned == 0);
   CHECK(closed->volume == Approx(6.0).epsilon(1e-12));
   CHECK(closed->surface.triangles.size() == 2 * 2 * (3 * 2 + 2 * 2 + 3 * 2));
 
@@ -125,6 +125,26 @@ TEST_CASE("a ball is recognised anywhere, and nothing else is", "[solid_mesh]") 
     closed = close_surface(other, Progress());
     REQUIRE(closed);
     CHECK_FALSE(as_ball(*closed));
+  }
+}
+
+TEST_CASE("a grid fills a solid and its volume", "[solid_mesh]") {
+  // A slab with a hole through it, and a part that no face joins to it.
+  Surface ring = revolved({{0.5, 0.0}, {1.0, 0.0}, {1.0, 0.2}, {0.5, 0.2}, {0.5, 0.0}}, 48);
+  const auto closed = close_surface(ring, Progress());
+  REQUIRE(closed);
+  const TetrahedronMesh mesh = grid_mesh(*closed, 30000, Progress());
+  const auto solid = quadratic(mesh);
+  REQUIRE(solid);
+  CHECK(static_cast<double>(solid->unknowns()) == Approx(30000).epsilon(0.4));
+  CHECK(volume_of(*solid) == Approx(closed->volume).epsilon(0.02));
+  for (const Tetrahedron& t : mesh.tetrahedra) {
+    Point3 middle{};
+    for (const int corner : t) {
+      middle = middle + 0.25 * mesh.points[static_cast<std::size_t>(corner)];
+    }
+    const double r = std::hypot(middle[0], middle[1]);
+    REQUIRE((r > 0.42 && r < 1.08));
   }
 }
 
