@@ -267,7 +267,12 @@ std::vector<Row> make_rows() {
        .details = "Every preset has its own, such as brightness and ring. 'control ring 0.8' is "
                   "the same as moving\nthe MIDI controller of that name.",
        .act = command::control},
-      {.command = "learn",
+      {.address = "/learn",
+       .arguments = {{.word = "TARGET", .is_text = true}},
+       .does =
+           "assigns the next knob that moves to a control or a parameter; replies /done or /fail",
+       .answer = answer::learn,
+       .command = "learn",
        .group = CommandGroup::parameters,
        .words = "CONTROL|PARAMETER",
        .command_does = "assigns the next knob that you move to a control or a parameter",
@@ -276,7 +281,11 @@ std::vector<Row> make_rows() {
            "other\nfunction until 'unlearn', in every preset that has this target. 'save NAME' "
            "saves the\nassignment.",
        .act = command::learn},
-      {.command = "unlearn",
+      {.address = "/unlearn",
+       .arguments = {{.word = "TARGET", .is_text = true}},
+       .does = "restores the preset's assignment of the target's knob; replies /done or /fail",
+       .answer = answer::unlearn,
+       .command = "unlearn",
        .group = CommandGroup::parameters,
        .words = "[CONTROL|PARAMETER]",
        .command_does = "restores the preset's assignment of a knob, or of all knobs",

@@ -304,6 +304,11 @@ std::vector<LearnedRow> CurrentScene::learned() const {
   return learned_;
 }
 
+std::optional<std::string> CurrentScene::waiting_target() const {
+  const std::lock_guard lock(mutex_);
+  return waiting_target_;
+}
+
 std::optional<LearnedRow> CurrentScene::assign_moved_controller(const Meters& now) {
   const std::lock_guard lock(mutex_);
   if (!waiting_target_ || now.turns == turns_before_ || !is_knob(now.last_controller)) {

@@ -97,6 +97,8 @@ class CurrentScene {
   // Forgets the controllers of this target, or all if it is empty. Returns how many.
   std::size_t unlearn(const std::string& target);
   std::vector<LearnedRow> learned() const;
+  // Returns the target that waits for a knob, or nothing.
+  std::optional<std::string> waiting_target() const;
   // Returns all controllers of the mapping, learned ones first.
   std::vector<MappedRow> mapping() const;
   // Returns the target of a row of the user's mapping.

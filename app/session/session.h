@@ -104,6 +104,7 @@ class Session {
   // Forgets the controllers of this target, or all if it is empty. Returns how many.
   std::size_t unlearn(const std::string& target) { return current_.unlearn(target); }
   std::vector<LearnedRow> learned() const { return current_.learned(); }
+  std::optional<std::string> waiting_target() const { return current_.waiting_target(); }
   std::vector<MappedRow> mapping() const { return current_.mapping(); }
 
   // Saves the playing scene with its present values as a preset of the user, and returns its path.

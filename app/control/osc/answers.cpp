@@ -105,6 +105,31 @@ void load_named(const Query& query, const std::string& name, std::optional<Argum
   query.session.load(name, answer, false, Reach::own_folders);
 }
 
+// Returns the only argument, a text; sends an error and returns null if there is another one.
+const std::string* only_text(const Query& query, const std::string& word) {
+  const auto& arguments = query.message.arguments;
+  const auto* const text =
+      arguments.size() == 1 ? std::get_if<std::string>(arguments.data()) : nullptr;
+  if (text == nullptr) {
+    query.client.error(query.message.address, query.message.address + ": expected " + word);
+  }
+  return text;
+}
+
+// Replies /done with the name, or /fail with the reason.
+template <class Value>
+void answer_named(const Query& query, const std::string& name, const Result<Value>& result) {
+  query.client.answer(Reply(result ? "/done" : "/fail")
+                          .text(query.message.address)
+                          .text(result ? name : result.error().message));
+}
+
+void answer_saved(const Query& query, const std::string& name, const Result<std::string>& path) {
+  answer_named(query, name, path);
+  query.client.outlet().log(path ? "OSC saved " + *path
+                                 : "OSC could not save '" + name + "': " + path.error().message);
+}
+
 void load_beside(const Query& query, int step) {
   const std::string name = query.session.preset_beside(step);
   if (name.empty()) {
@@ -175,33 +200,31 @@ void answer::previous_preset(const Query& query) {
 
 // Never overwrites: the sender of a packet has not seen what is there.
 void answer::save(const Query& query) {
-  const Message& message = query.message;
-  if (message.arguments.size() != 1 || !std::holds_alternative<std::string>(message.arguments[0])) {
-    query.client.error(message.address, message.address + ": expected NAME");
-    return;
+  if (const auto* const name = only_text(query, "NAME")) {
+    answer_saved(query, *name, query.session.save(*name, Existing::refuse));
   }
-  const auto& name = std::get<std::string>(message.arguments[0]);
-  const auto path = query.session.save(name, Existing::refuse);
-  Reply reply(path ? "/done" : "/fail");
-  reply.text(message.address).text(path ? name : path.error().message);
-  query.client.answer(reply);
-  query.client.outlet().log(path ? "OSC saved " + *path
-                                 : "OSC could not save '" + name + "': " + path.error().message);
 }
 
 void answer::flight(const Query& query) {
-  const Message& message = query.message;
-  if (message.arguments.size() != 1 || !std::holds_alternative<std::string>(message.arguments[0])) {
-    query.client.error(message.address, message.address + ": expected NAME");
-    return;
+  if (const auto* const name = only_text(query, "NAME")) {
+    answer_saved(query, *name, query.session.save_flight(*name));
   }
-  const auto& name = std::get<std::string>(message.arguments[0]);
-  const auto path = query.session.save_flight(name);
-  Reply reply(path ? "/done" : "/fail");
-  reply.text(message.address).text(path ? name : path.error().message);
-  query.client.answer(reply);
-  query.client.outlet().log(path ? "OSC saved " + *path
-                                 : "OSC could not save '" + name + "': " + path.error().message);
+}
+
+void answer::learn(const Query& query) {
+  if (const auto* const target = only_text(query, "TARGET")) {
+    answer_named(query, *target, query.session.learn(*target));
+  }
+}
+
+void answer::unlearn(const Query& query) {
+  if (const auto* const target = only_text(query, "TARGET")) {
+    const bool waits = query.session.waiting_target() == *target;
+    const bool had = query.session.unlearn(*target) > 0 || waits;
+    answer_named(
+        query, *target,
+        had ? Result<Done>(Done{}) : Error{"no controller is assigned to '" + *target + "'"});
+  }
 }
 
 void answer::status(const Query& query) {
@@ -367,9 +390,7 @@ void answer::song(const Query& query) {
   const std::string& address = query.message.address;
   const auto done =
       control_song(query.session, address.substr(address.rfind('/') + 1), query.message.arguments);
-  query.client.answer(Reply(done ? "/done" : "/fail")
-                          .text(address)
-                          .text(done ? query.session.song().description() : done.error().message));
+  answer_named(query, query.session.song().description(), done);
 }
 
 void answer::unsubscribe(const Query& query) {

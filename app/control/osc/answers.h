@@ -20,6 +20,10 @@ void previous_preset(const Query& query);
 void save(const Query& query);
 void flight(const Query& query);
 
+// Reply /done s:address s:target, or /fail s:address s:reason.
+void learn(const Query& query);
+void unlearn(const Query& query);
+
 // Replies /status.reply with the figures of status.h.
 void status(const Query& query);
 

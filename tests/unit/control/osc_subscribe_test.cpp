@@ -261,6 +261,35 @@ TEST_CASE("models and presets are listed over OSC, and saved", "[osc_subscribe]"
   CHECK(has(osc.news, "OSC saved"));
 }
 
+TEST_CASE("a controller is learnt and forgotten over OSC", "[osc_subscribe]") {
+  OscHarness osc;
+  Client client(osc.server->port());
+  const auto told = [&](const Bytes& bytes) {
+    const auto answer = client.ask(bytes);
+    return answer.address + " " + answer.text(0) + " " + answer.text(1);
+  };
+  Session& session = osc.harness.session;
+  CHECK(told(message("/learn", {"m_K"})) == "/done /learn m_K");
+  CHECK(session.waiting_target() == "m_K");
+  CHECK(has(told(message("/learn", {"m_Q"})), "/fail /learn there is no parameter"));
+  CHECK(told(message("/unlearn", {"m_K"})) == "/done /unlearn m_K");  // Ends the waiting.
+  CHECK_FALSE(session.waiting_target());
+  CHECK(told(message("/unlearn", {"m_K"})) == "/fail /unlearn no controller is assigned to 'm_K'");
+
+  CHECK(told(message("/learn", {"m_K"})) == "/done /learn m_K");
+  const TimedEvent turned{{.kind = EventKind::controller, .index = 21, .value = 0.5}};
+  REQUIRE(osc.harness.process.send(osc.harness.process.from_midi, {&turned, 1}));
+  for (int i = 0; i < 200 && session.learned().empty(); ++i) {
+    osc.harness.play();
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  CHECK(session.learned().size() == 1);
+  CHECK_FALSE(session.waiting_target());
+  CHECK(told(message("/unlearn", {"m_K"})) == "/done /unlearn m_K");
+  CHECK(session.learned().empty());
+  CHECK(client.ask(message("/learn")).address == "/error");
+}
+
 TEST_CASE("an OSC error is logged locally, too", "[osc_subscribe]") {
   OscHarness osc;
   Client client(osc.server->port());
