@@ -1,10 +1,16 @@
 # Writes OUTPUT, a source with the files of the page in FOLDER as byte arrays, because compilers need not
-# accept string literals above 64 kB.
+# accept string literals above 64 kB. The browser gets them without comments and spare spaces.
 set(types "html|text/html" "css|text/css" "js|text/javascript" "svg|image/svg+xml")
 set(arrays "")
 set(rows "")
 foreach(file index.html panel.css panel.js draw.js icon.svg)
-  file(READ ${FOLDER}/${file} bytes HEX)
+  file(READ ${FOLDER}/${file} text)
+  string(REGEX REPLACE "\n +" "\n" text "${text}")
+  string(REGEX REPLACE "(\n|  )//[^\n]*" "" text "${text}")
+  if(file MATCHES "css$")
+    string(REGEX REPLACE " *([{}:,;])[ \n]*" "\\1" text "${text}")
+  endif()
+  string(HEX "${text}" bytes)
   string(REGEX REPLACE "(..)" "0x\\1," bytes "${bytes}")
   string(MAKE_C_IDENTIFIER ${file} name)
   string(APPEND arrays "const unsigned char ${name}[] = {${bytes}};\n")

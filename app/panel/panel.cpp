@@ -427,7 +427,7 @@ struct WebPanel::Server {
     response.set_chunked_content_provider(
         "text/event-stream", [this, seat, heard = std::uint64_t{0}, changes = Changes()](
                                  std::size_t, httplib::DataSink& sink) mutable {
-          std::string events = changes.since_last(session.present());
+          std::string events = changes.since_last(session);
           for (const std::string& text : news->after(heard)) {
             events += server_event("news", quoted(text));
           }

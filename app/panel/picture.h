@@ -70,10 +70,12 @@ void find_positions(const Picture& picture, const MotionFrame& frame, std::span<
 // Returns the drawing as JSON:
 // {"picture", "dots", "plane", "x": [], "y": [], "start": [], "names": [], "kinds": "",
 // "users": {parameter: [name, count]},
+// "wide", "bodies": [{"name", "strings", "places": [], "modes": [[displacement at place]]}],
 // "links": [[a, b, law, zone, reach]], "laws": [[name, family]], "inputs": [[number, node,
 // force]], "outputs": [[number, node]]}
-// Nodes are the dots, then the fixed points. Computes the layout: some ms per thousand masses. [any
-// thread but audio]
+// Nodes are the dots, then the fixed points. The modes of a body are the nodes "BODY:1" and on. A
+// modal string has 1 to 4 strings, a length of `wide`, and no places. Computes the layout: some ms
+// per thousand masses. [any thread but audio]
 std::string network_json(const Picture& picture);
 
 // Returns the lowest modes for the current parameters as JSON:

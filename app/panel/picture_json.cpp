@@ -81,6 +81,8 @@ class NetworkJsonWriter {
                    {"links", std::move(links)},
                    {"laws", std::move(laws)},
                    {"users", users()},
+                   {"wide", wide_},
+                   {"bodies", bodies()},
                    {"inputs", std::move(inputs)},
                    {"outputs", std::move(outputs)}};
     return out.dump(-1, ' ', false, json::error_handler_t::replace);
@@ -99,15 +101,6 @@ class NetworkJsonWriter {
       }
     }
     tops_ = layout.tops;
-    const std::vector<std::uint32_t> starts = macro_starts(*picture_.network);
-    for (std::size_t i = 0; i < starts.size(); ++i) {
-      const Macro& macro = picture_.network->macros[i];
-      const bool is_body = consists_of_modes(macro.kind) && !is_plane_;
-      for (std::uint32_t k = 0; is_body && k < macro.length * macro.width; ++k) {
-        at_[starts[i] + k]->x =
-            along(macro, macro.length > 1 ? k / macro.width / (macro.length - 1.0) : 0.5);
-      }
-    }
     const std::vector<Mass>& written = picture_.network->masses;
     for (std::uint32_t i = 0; i < written.size(); ++i) {
       if (written[i].kind == MassKind::point) {
@@ -117,24 +110,16 @@ class NetworkJsonWriter {
     is_laid_out_ = is_plane_ || !has_row_only || is_chain(layout);
   }
 
-  // Modes have no position, so they are spread over the available width.
-  double along(const Macro& body, double u) const {
-    return is_plane_ ? (body.length - 1.0) * u : wide_ * u;
-  }
-
-  // A place on a waveguide lies on its line, a place on a body below its modes.
+  // A place on a string lies on its line. The page knows where the places of a body are.
   std::optional<LayoutPoint> point_of(const Tap& tap, std::uint32_t mass) const {
-    const Macro& macro = picture_.network->macros[tap.macro];
+    const MacroKind kind = picture_.network->macros[tap.macro].kind;
+    if (!is_waveguide(kind) && kind != MacroKind::modal_string) {
+      return std::nullopt;
+    }
     const double u = is_bridge(*picture_.network, tap)
                          ? 1.0
                          : std::clamp(argument_value(network_, tap.u, parameters_), 0.0, 1.0);
-    if (is_waveguide(macro.kind)) {
-      return LayoutPoint{wide_ * u, tops_[tap.macro], mass};
-    }
-    if (consists_of_modes(macro.kind)) {
-      return LayoutPoint{along(macro, u), tops_[tap.macro] + macro.width, mass};
-    }
-    return std::nullopt;
+    return LayoutPoint{wide_ * u, tops_[tap.macro], mass};
   }
 
   // A single row is a chain only if neighbours are linked; otherwise the positions are unknown.
@@ -191,6 +176,28 @@ class NetworkJsonWriter {
     for (std::size_t i = 1; i < line.size(); ++i) {
       lines.push_back({line[i - 1].second, line[i].second, static_cast<int>(linear_law)});
     }
+  }
+
+  // Returns what consists of modes: bodies and modal strings.
+  json bodies() const {
+    const Network& network = *picture_.network;
+    json found = json::array();
+    for (std::uint32_t i = 0; i < network.macros.size(); ++i) {
+      const Macro& macro = network.macros[i];
+      json modes = json::array();
+      for (const BodyMode& mode : network.modes) {
+        if (mode.macro == i) {
+          modes.push_back(mode.shape);
+        }
+      }
+      if (consists_of_modes(macro.kind)) {
+        found.push_back({{"name", macro.name},
+                         {"strings", macro.kind == MacroKind::modal_string ? macro.width : 0},
+                         {"places", macro.places},
+                         {"modes", modes}});
+      }
+    }
+    return found;
   }
 
   // Returns for each parameter the first link or macro that uses it, and the number of users.

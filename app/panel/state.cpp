@@ -57,6 +57,20 @@ json input_json(const InputInfo& info, const Preset& preset) {
           {"gestures", known}};
 }
 
+// Returns the controllers that act on the playing scene, and the target that waits for one.
+std::string mapping_json(const Session& session) {
+  json rows = json::array();
+  for (const MappedRow& row : session.mapping()) {
+    if (row.exists) {
+      rows.push_back({{"from", name_of(row.setting.input)},
+                      {"to", row.setting.target},
+                      {"learned", row.is_learned},
+                      {"relative", row.setting.input.mode != ControllerMode::absolute}});
+    }
+  }
+  return dumped({{"waiting", session.waiting_target().value_or("")}, {"rows", rows}});
+}
+
 }  // namespace
 
 std::string describe_json(const Session& session) {
@@ -78,6 +92,7 @@ std::string describe_json(const Session& session) {
     knobs.push_back({{"name", knob.name},
                      {"address", knob.address()},
                      {"help", knob.help},
+                     {"controller", knob.controller},
                      {"value", now.knobs[i]}});
   }
   std::set<std::string> controls;
@@ -114,6 +129,7 @@ std::string describe_json(const Session& session) {
                  {"parameters", parameters},
                  {"knobs", knobs},
                  {"controls", controls},
+                 {"through", loaded.preset.through},
                  {"inputs", inputs},
                  {"models", known_models()},
                  {"presets", presets}});
@@ -147,7 +163,8 @@ std::string quoted(const std::string& text) {
   return dumped(json(text));
 }
 
-std::string Changes::since_last(const Session::Present& now) {
+std::string Changes::since_last(const Session& session) {
+  const Session::Present now = session.present();
   std::string events;
   const bool is_other = told_.loaded == nullptr || told_.loaded->serial != now.loaded->serial;
   if (is_other) {
@@ -169,6 +186,10 @@ std::string Changes::since_last(const Session::Present& now) {
     events += server_event("values", dumped(values));
   }
   told_ = now;
+  if (std::string mapping = mapping_json(session); mapping != told_mapping_) {
+    events += server_event("mapping", mapping);
+    told_mapping_ = std::move(mapping);
+  }
   return events;
 }
 

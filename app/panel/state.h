@@ -22,13 +22,16 @@ std::string describe_json(const Session& session);
 // "flatness". Numbers that are not finite are null.
 std::string status_json(const Status& status, const std::optional<SpectralShape>& shape);
 
-// Collects the changes since the last call as server-sent events: `loaded`, `values`, then `news`.
+// Collects the changes since the last call as server-sent events: `loaded`, `values`, then
+// `mapping`, {"waiting": "brightness", "rows": [{"from": "cc20", "to": "brightness", "learned",
+// "relative"}]}.
 class Changes {
  public:
-  std::string since_last(const Session::Present& now);
+  std::string since_last(const Session& session);
 
  private:
   Session::Present told_;
+  std::string told_mapping_;
 };
 
 // Returns "event: NAME\ndata: ...\n\n"; the data has no line breaks.

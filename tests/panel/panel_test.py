@@ -6,6 +6,7 @@
 FOLDER is the checkout. With `pictures` it takes screenshots instead, of the models that follow.
 """
 import http.client
+import math
 import os
 import re
 import signal
@@ -424,11 +425,113 @@ def shows_modes(browser):
     check(browser.eventually("document.querySelectorAll('#modes button').length === 24"),
           "the page lists the modes")
     browser.evaluate("document.querySelector('#modes button').click()")
-    check(browser.evaluate("panel.view.mode.length === panel.view.net.dots"),
+    check(browser.evaluate("panel.view.mode.length === panel.view.net.x.length"),
           "a click shows a mode's shape")
     check(browser.evaluate("document.querySelector('#modes button').textContent")
           .startswith("99.29 Hz"), "the first mode is the one that `ressort check` prints, 99.29 Hz")
     browser.evaluate("document.querySelector('#modes button').click()")
+
+
+# A bell with two modes and three places, and a string with eight partials.
+BELL = """@bell body 1. clapper left right
+@b1 mode @bell 200. 3. 1. 0.5 -0.5
+@b2 mode @bell 500. 3. 0.2 -0.8 0.4
+@s modalString 8 1. 300. 0. 1. 0. 0.
+@in1 frcInput [@bell clapper]
+@in2 frcInput [@s 0.25]
+@out1 posOutput [@bell left]
+@out1 posOutput [@s 0.25]
+"""
+
+
+def shows_bodies(program, browser):
+    """A bell is a ring with named places, and a string is a line. Both move as their modes do."""
+    check(browser.evaluate("""(() => { const f = panel.view.net.figures[0];
+      return f.form.isRing && f.names.join() === 'clapper,left,right' && f.nodes.every(n =>
+        Math.abs(Math.hypot((panel.view.flat[n][0] - f.x) / f.rx, (panel.view.flat[n][1] - f.y) / f.ry) - 1) < 1e-9); })()"""),
+          "the places of a bell are on a ring")
+    browser.eventually("document.querySelector('#sliders p')")
+    browser.evaluate("document.getElementById('find-modes').click()")
+    browser.eventually("document.querySelectorAll('#modes button').length > 3")
+    shapes = browser.evaluate("""(() => { const { view } = panel, { net } = view, line = [];
+      [...net.kinds].forEach((kind, i) => { if (kind === 'w' && !net.figures[0].nodes.includes(i)) line.push(i); });
+      const moved = hz => {
+        const button = [...document.querySelectorAll('#modes button')].find(b => b.textContent.startsWith(hz + ' Hz'));
+        button.click();
+        const of = nodes => nodes.map(node => view.mode[node]), both = [of(net.figures[0].nodes), of(line)];
+        button.click();
+        return both;
+      };
+      return [moved('200.0'), moved('500.0'), moved('600.0')]; })()""")
+    for (bell, string), shape in zip(shapes, ((1, 0.5, -0.5), (0.2, -0.8, 0.4), None)):
+        if shape:
+            check(all(abs(a / bell[1] - b / shape[1]) < 1e-6 for a, b in zip(bell, shape)),
+                  f"a mode moves the places of the bell by {shape}")
+        else:
+            sine = [math.sin(2 * math.pi * i / 48) for i in range(49)]
+            check(max(abs(a - b * string[12]) for a, b in zip(string, sine)) < 1e-6
+                  and abs(string[12]) > 0.1, "the second partial moves the string as a whole sine")
+    x, y = on_picture(browser, "bell:left")
+    check(hint(browser).startswith("bell:left"), "the hint says that a click strikes bell:left")
+    click(browser, x, y)
+    check(browser.eventually("panel.status.peak_db > -60"), "and it sounds")
+    at = "(name => { const v = panel.view, i = v.net.names.indexOf(name); return v.positions[i] - v.net.start[i]; })"
+    browser.eventually(f"Math.abs({at}('bell:1')) > 1e-3")
+    first, second, left = browser.evaluate(f"['bell:1', 'bell:2', 'bell:left'].map({at})")
+    check(0 < abs(first) and abs(0.5 * first - 0.8 * second - left) < 1e-5 * abs(first),
+          "the place has moved by its share of each mode")
+
+
+def falls(program, browser):
+    """The spectrogram shows the pitch of a tone, and moves by a tenth of its width in a second."""
+    look = """(() => { const s = panel.spectrogram, { width, height } = s.past.canvas;
+      const row = Math.floor(height * (1 - Math.log(200 / 30) / Math.log(panel.status.rate / 60)));
+      const ink = (x, y) => { const p = s.past.getImageData(x, y, 1, 1).data, q = s.past.getImageData(0, 0, 1, 1).data;
+        return Math.abs(p[0] - q[0]) + Math.abs(p[1] - q[1]) + Math.abs(p[2] - q[2]); };
+      let first = 0, best = 0;
+      while (first < width && ink(first, row) < 60) first++;
+      for (let y = 0; y < height; y++) if (ink(width - 2, y) > ink(width - 2, best)) best = y;
+      return [first / width, s.time, 30 * (panel.status.rate / 60) ** (1 - (best + 0.5) / height)]; })()"""
+    for _ in range(3):  # A busy machine may show the tone late.
+        silence(program, browser)
+        time.sleep(1.0)
+        program.osc("/mass/bell:clapper/strike", 0.9)
+        browser.eventually("panel.status.peak_db > -60")
+        time.sleep(0.5)
+        first, begin, hz = browser.evaluate(look)
+        time.sleep(2.0)
+        then, end, _ = browser.evaluate(look)
+        if 0 < then < first < 1:
+            break
+    print(f"        {hz:.0f} Hz, from {first:.3f} to {then:.3f} of the width in {end - begin:.2f} s")
+    # A bin of the spectrum is 23 Hz wide, a row of the picture 6 %.
+    check(abs(math.log(hz / 200)) < 0.12, "the brightest row is at the pitch of the bell, 200 Hz")
+    check(abs((first - then) * 10 - (end - begin)) < 0.1, "the picture moves at a tenth a second")
+
+
+def learns(program, browser):
+    """The knobs show the controllers that move them, and learn and forget them by a button."""
+    desk = lambda n: f".knob:nth-child({n}) .desk small"
+    button = lambda n: f".knob:nth-child({n}) .desk button"
+    check(browser.eventually(f"document.querySelector('{desk(1)}').textContent ==="
+                             " 'CC 20, relative; CC 74'"), "a knob shows its controllers")
+    browser.evaluate(f"document.querySelector('{button(2)}').focus()")
+    browser.key("Enter", "Enter", "\r")
+    check(browser.eventually(f"document.querySelector('{desk(2)}').textContent ==="
+                             " 'move a knob\u2026'"), "a key on its button makes it wait for a knob")
+    browser.evaluate(f"document.querySelector('{button(2)}').click()")
+    check(browser.eventually(f"document.querySelector('{desk(2)}').textContent === 'CC 71'"),
+          "a click ends that")
+    browser.evaluate(f"document.querySelector('{button(2)}').click()")
+    browser.eventually(f"document.querySelector('{button(2)}').textContent === 'Cancel'")
+    program.osc("/cc", 21, 64)
+    check(browser.eventually(f"document.querySelector('{desk(2)}').textContent ==="
+                             " 'learnt: CC 21; CC 71'"), "the controller that moves is assigned")
+    program.osc("/cc", 21, 127)
+    check(eventually(lambda: program.control("ring") == 1.0), "and moves the knob")
+    browser.evaluate(f"document.querySelector('{button(2)}').click()")
+    check(browser.eventually(f"document.querySelector('{desk(2)}').textContent === 'CC 71'"),
+          "and is forgotten")
 
 
 def slows_down(program, browser):
@@ -476,7 +579,9 @@ def loads(program, browser):
 
 
 def test(program_path):
-    program = Program(program_path, "20x30mesh", "-z", "256")
+    with tempfile.NamedTemporaryFile("w", suffix=".toml", delete=False) as file:
+        file.write('[[controller]]\nfrom = "cc20"\nto = "brightness"\nmode = "twos-complement"\n')
+    program = Program(program_path, "20x30mesh", "-z", "256", "--controllers", file.name)
     try:
         doors(program)
         with Browser() as browser:
@@ -491,12 +596,14 @@ def test(program_path):
             keys(program, browser)
             slides(program, browser)
             turns(program, browser)
+            learns(program, browser)
             shows_modes(browser)
             slows_down(program, browser)
             loads(program, browser)
             check(browser.complaints() == [],
                   f"the browser reports no error {browser.complaints() or ''}")
     finally:
+        os.remove(file.name)
         check(program.close() == 0, "the program ends normally while the page is open")
         if failures:
             print("the program said:\n" + "".join(program.lines))
@@ -524,6 +631,11 @@ def test_model(program_path, text, dots, look):
 def test_strings(program, browser):
     strikes(program, browser, ("low:0.3", "high:0.3"))
     swings(browser)
+
+
+def test_bodies(program, browser):
+    shows_bodies(program, browser)
+    falls(program, browser)
 
 
 def pictures(program_path, folder, models):
@@ -561,6 +673,7 @@ def main():
         test_model(program, APART, 4, lambda p, b: strikes(p, b, ("low_b", "high_b")))
         test_model(program, STRUNG, 2 + 66, test_strings)
         test_model(program, MIDDLE, 29, mirrors)
+        test_model(program, BELL, 13, test_bodies)
     finally:
         jack.terminate()
         jack.wait()

@@ -1,5 +1,4 @@
 // Draws the network on its canvas: positions of the nodes, their motion, and hit-testing.
-const families = ['spring', 'pluck', 'bow', 'contact'];
 const css = name => getComputedStyle(document.documentElement).getPropertyValue('--' + name).trim();
 
 function mixed(a, b, share) {
@@ -12,12 +11,7 @@ function mixed(a, b, share) {
 // deterministic.
 function forceLayout(net) {
   const n = net.x.length;
-  const golden = 2.399963;
-  const x = new Float64Array(n), y = new Float64Array(n);
-  for (let i = 0; i < n; i++) {
-    const r = Math.sqrt(i + 0.5);
-    x[i] = r * Math.cos(golden * i); y[i] = r * Math.sin(golden * i);
-  }
+  const spiral = turn => net.x.map((_, i) => Math.sqrt(i + 0.5) * turn(2.399963 * i)), x = spiral(Math.cos), y = spiral(Math.sin);
   const steps = n > 600 ? 40 : n > 200 ? 120 : 300;
   for (let step = 0; step < steps; step++) {
     const heat = 1.5 * (1 - step / steps) + 0.02;
@@ -36,103 +30,227 @@ function forceLayout(net) {
       x[i] += dx[i] / d * go; y[i] += dy[i] / d * go;
     }
   }
-  net.x = [...x]; net.y = [...y];
-  net.plane = true;
+  Object.assign(net, { x, y, plane: true });
+}
+
+// Bodies are drawn by a word of their name, of their places or of the model. Lines go from
+// -1 to 1 to the right and to the front; `still` ones do not move. `tall`: height by width.
+const circle = Array.from({ length: 121 }, (_, i) => [Math.sin(i * Math.PI / 60), Math.cos(i * Math.PI / 60)]);
+const inner = circle.map(([u, v]) => [u / 2, v / 2]);
+const hull = depth => circle.slice(0, 61).map(([u, v]) => [v, depth * u]);
+const slab = circle.map((_, i) => [1 - Math.abs(i % 120 / 30 - 2), i % 120 < 60 ? 1 : -1]);
+const sides = width => circle.map(([u, v]) => [u, Math.sign(v) * Math.sqrt(1 - u ** 4) * width(u)]);
+const neck = [[-1, -0.1], [-3, -0.07], [-3, 0.07], [-1, 0.1]], bridge = [[0.4, -0.25], [0.4, 0.25]];
+const hole = side => [[0, 0.16 * side], [0.3, 0.36 * side]];
+const forms = {
+  bar: { words: /bar|tube|tongue|comb|reed/, tall: 0.05, lines: [slab] },
+  violin: { words: /viol|cello|bassbox/, tall: 0.9, isBox: true,
+    still: [neck, sides(u => 0.74 + 0.12 * u - (Math.abs(u + 0.05) < 0.28 ? 0.2 : 0)), bridge, hole(1), hole(-1)] },
+  guitar: { words: /guitar|oud|sitar|bass/, tall: 0.8, isBox: true,
+    still: [neck, sides(u => 0.86 + 0.14 * u - 0.2 * Math.cos(3 * u + 0.4)), bridge, circle.map(([u, v]) => [0.17 * u - 0.15, 0.2 * v])] },
+  board: { words: /box|board|body/, tall: 0.8, isBox: true, still: [sides(() => 0.9), bridge] },
+  bowl: { words: /bowl|glass|cup/, tall: 0.42, isRing: true, still: [hull(2.4)], lines: [circle] },
+  bell: { words: /bell/, tall: 0.42, isRing: true, still: [hull(-4)], lines: [circle] },
+  disc: { words: /skin|head|drum|pan|gong/, tall: 0.42, still: [hull(2)], lines: [circle, inner] },
+  sheet: { words: /sheet|plate/, tall: 0.4, lines: [slab] },
+};
+const formOf = (...names) => names.map(name => Object.values(forms).find(form => form.words.test(name.toLowerCase()))).find(Boolean);
+
+const spots = {
+  left: [-0.65, -0.2], right: [0.65, -0.2], centre: [0, 0], half: [0, 0.5], edge: [0, 0.95], rim: [0, 1],
+  tip: [-0.97, 0], cap: [-0.97, 0], bridge: [0.4, 0], bass: [0.4, 0.4], treble: [0.4, -0.4],
+};
+
+// Adds the lines of modal strings and the figures of bodies. `rules` says how the modes, which are
+// not drawn, move the nodes.
+function addBodies(net, model) {
+  net.rules = []; net.figures = []; net.hidden = new Set();
+  // The box that all voices sound through, or else that of the model, does not move.
+  const [box, boxName] = [...model.through, model.name].map(name => [formOf(name), name]).find(([form]) => form?.isBox) ?? [];
+  if (box && !net.plane && net.bodies.every(body => body.strings) && (boxName !== model.name || box !== forms.board))
+    net.figures.push(net.box = { form: box, nodes: [], spots: [], names: [], name: boxName === model.name ? '' : boxName.replace('.mdl', '') });
+  // A string is played near its bridge. Its ends are alike, so the played one is drawn there.
+  const isTurned = net.box && /:0\.[0-4]/.test(net.names.join(' '));
+  const along = u => net.wide * (isTurned ? 1 - u : u);
+  const spring = net.laws.findIndex(law => law[1] === 'spring');
+  const add = (x, y) => {
+    net.kinds += 'w';
+    net.y.push(y); net.start.push(0); net.names.push('');
+    return net.x.push(x) - 1;
+  };
+  for (const { name, strings, places, modes } of net.bodies) {
+    const own = [], taps = [];  // [node, number of the mode or name of the place]
+    net.names.forEach((full, i) => {
+      if (full.startsWith(name + ':')) (net.kinds[i] === 'o' ? own : taps).push([i, full.slice(name.length + 1)]);
+    });
+    own.forEach(([i]) => net.hidden.add(i));
+    const by = weight => own.map(([i, k]) => [i, weight(k - 1)]);
+    const sine = (u, k) => Math.sin(Math.PI * (Math.floor(k / strings) + 1) * u);
+    for (let string = 0; string < strings && own.length; string++) for (let i = 0; i <= 48; i++) {
+      const node = add(along(i / 48), net.y[own[string][0]]);
+      net.rules.push([node, by(k => k % strings === string ? sine(i / 48, k) : 0)]);
+      if (i) net.links.push([node - 1, node, spring]);
+    }
+    if (strings) {
+      for (const [i, place] of taps) {
+        const u = net.x[i] / net.wide, isBridge = place === 'bridge';
+        net.x[i] = isBridge ? net.wide : along(u);
+        net.rules.push([i, isBridge ? [] : by(k => sine(u, k) / strings)]);
+      }
+      continue;
+    }
+    const form = formOf(name, ...places, model.name) ?? forms.bar, figure = { form, nodes: [], spots: [], names: [] };
+    let free = 0;
+    const at = places.map(place => spots[place] ?? [0.4 * Math.ceil(free / 2) * (-1) ** free++ - 0.06, 0.6]);
+    // A place between two named ones has a number from 0 to 1.
+    const mixed = (values, place) => {
+      const on = place * (values.length - 1), low = Math.min(Math.floor(on), values.length - 2);
+      return values[low] + (on - low) * (values[low + 1] - values[low]);
+    };
+    for (const place of new Set([...places, ...taps.map(tap => tap[1])])) {
+      const p = places.indexOf(place), value = p < 0 ? values => mixed(values, +place) : values => values[p];
+      const node = taps.find(tap => tap[1] === place)?.[0] ?? add(0, 0), spot = [0, 1].map(side => value(at.map(a => a[side])));
+      figure.nodes.push(node);
+      figure.names.push(p < 0 ? '' : place);
+      figure.spots.push(form.isRing ? spot.map(x => x / Math.hypot(...spot)) : spot);
+      net.rules.push([node, by(k => value(modes[k]))]);
+    }
+    net.figures.push(figure);
+  }
+}
+
+// Finds the nodes beside the instrument: what touches a place, such as a bow or a hammer, and the
+// small parts that are not connected to it, such as a frame with its noise.
+function partBodies(net) {
+  const part = net.x.map((_, i) => i), root = i => part[i] === i ? i : part[i] = root(part[i]);
+  const partners = net.x.map(() => []), ruled = new Set(net.rules.map(rule => rule[0]));
+  for (const [a, b] of net.links) { part[root(a)] = root(b); partners[a].push(b); partners[b].push(a); }
+  const isOf = i => ruled.has(i) || net.hidden.has(i), isFixed = i => 'hg'.includes(net.kinds[i]);
+  net.hanging = [];  // [node, the node that it touches]
+  const heavy = new Set(), parts = net.x.map(() => 0);
+  net.x.forEach((_, i) => {
+    const place = partners[i].find(isOf);
+    if (place !== undefined && !isOf(i) && partners[i].every(other => isOf(other) || isFixed(other))) net.hanging.push([i, place]);
+    if (isOf(i) || (!isFixed(i) && parts[root(i)]++)) heavy.add(root(i));
+  });
+  const hangs = new Set(net.hanging.map(pair => pair[0])), inFigure = new Set(net.figures.flatMap(figure => figure.nodes));
+  const free = net.x.map((_, i) => i).filter(i => !hangs.has(i) && !inFigure.has(i) && !net.hidden.has(i));
+  net.loose = net.plane || !heavy.size ? [] : free.filter(i => !heavy.has(root(i)));
+  net.rows = free.filter(i => !net.loose.includes(i));
 }
 
 export class NetworkView {
   constructor(canvas) {
     this.canvas = canvas;
-    this.net = null;
-    this.positions = null;
-    this.peak = 1e-6;
-    this.mode = null;
     this.chosen = -1;  // The played target: an input, or a node (numbered after the inputs).
-    this.pull = null;  // {from, to}: the gesture in progress.
     new ResizeObserver(() => this.fit()).observe(canvas);
-    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.colours());
-    this.colours();
   }
 
-  colours() {
-    this.colour = {};
-    for (const name of ['card', 'ink', 'quiet', 'line', 'mass', 'held', 'up', 'down', 'accent', ...families])
-      this.colour[name] = css(name);
-    const tint = Math.max(...[1, 3, 5].map(i => parseInt(this.colour.spring.slice(i, i + 2), 16))) > 0;
-    this.tints = [];
-    for (let i = -6; i <= 6; i++)
-      this.tints.push(tint ? mixed(this.colour.spring, i < 0 ? this.colour.down : this.colour.up, Math.abs(i) / 6) : this.colour.spring);
-  }
-
-  setNetwork(net) {
+  setNetwork(net, model) {
     if (!net.drawn && net.x.length <= 1500) forceLayout(net);
-    const last = { x: 0, y: 0 };
-    for (let i = 0; i < net.x.length; i++) {  // Unconnected nodes are drawn at the side.
-      if (net.x[i] === null) { net.x[i] = last.x - 1; net.y[i] = last.y; }
-    }
-    this.net = net;
-    this.positions = Float32Array.from(net.start);
-    this.peak = 1e-6;
-    this.mode = null;
-    this.trail = [];
-    this.sx = new Float32Array(net.x.length);
-    this.sy = new Float32Array(net.x.length);
+    addBodies(net, model);
+    partBodies(net);
+    net.x = net.x.map(x => x ?? -1);  // Unconnected nodes are drawn at the side.
+    net.y = net.y.map(y => y ?? 0);
+    Object.assign(this, { net, mode: null, peak: 1e-6, trail: [], sx: new Float32Array(net.x.length), sy: new Float32Array(net.x.length) });
+    this.move(Float32Array.from(net.start.slice(0, net.dots)));
     this.fit();
   }
 
   fit() {
-    const ratio = devicePixelRatio || 1, box = this.canvas.getBoundingClientRect();
-    this.width = box.width; this.height = box.height;
-    this.canvas.width = Math.round(box.width * ratio);
-    this.canvas.height = Math.round(box.height * ratio);
-    this.context = this.canvas.getContext('2d');
-    this.context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    const { c, width, height } = prepared(this.canvas);
+    Object.assign(this, { context: c, width, height });
     const net = this.net;
     if (!net || !net.x.length) return;
+    const margin = Math.min(56, this.width * 0.08), room = this.height - 2 * margin - 30;
+    this.flat = net.x.map(() => [0, 0]);
+    this.way = net.x.map(() => [0, 0]);  // Displacement on the canvas of a height of 1.
+    net.figures.forEach((figure, i) => this.fitFigure(figure, i, margin, room));
+    this.fitRows(margin, room);
+    const beside = {};
+    net.hanging.forEach(([node, place]) => {
+      const count = beside[place] = (beside[place] ?? -1) + 1, [x, y] = this.flat[place];
+      this.flat[node] = [x + 32 * count, y + 60 - 10 * count];
+      this.way[node] = [0, -12];
+    });
+    net.loose.forEach((node, i) => { this.flat[node] = [margin + 44 * i, 50]; this.way[node] = [0, -12]; });
+  }
+
+  fitRows(margin, room) {
+    const net = this.net, { width, height } = this;
     // A planar network is seen from above at an angle, so that motion has room.
     const turn = net.plane ? 0.38 : 0, tilt = net.plane ? 0.58 : 1;
     const c = Math.cos(turn), s = Math.sin(turn);
     let left = 1e9, right = -1e9, top = 1e9, bottom = -1e9;
-    this.flat = net.x.map((x, i) => {
-      const y = net.y[i], u = x * c - y * s, v = (x * s + y * c) * tilt;
+    const flat = net.rows.map(i => {
+      const x = net.x[i], y = net.y[i], u = x * c - y * s, v = (x * s + y * c) * tilt;
       left = Math.min(left, u); right = Math.max(right, u); top = Math.min(top, v); bottom = Math.max(bottom, v);
       return [u, v];
     });
-    const margin = Math.min(56, this.width * 0.08), wide = right - left || 1, high = bottom - top || 1;
-    const room = this.height - 2 * margin - 30;
-    this.reach = Math.min(this.height, this.width) * (net.plane ? 0.13 : 0.24);
-    let k = (this.width - 2 * margin) / wide, kv = k;
+    const wide = right - left || 1, high = bottom - top || 1;
+    const reach = Math.min(height, width) * (net.plane ? 0.13 : 0.24);
+    // A string goes from the end of the neck to the bridge.
+    const { x, y, rx } = net.box ?? {}, [middle, length] = rx ? [x - 1.3 * rx, 3.4 * rx] : [width / 2, width - 2 * margin];
+    let k = length / wide, kv = k;
     if (net.plane) k = kv = Math.min(k, room / high);
     // Rows need room to vibrate.
-    else kv = Math.min(Math.max(k, 1.3 * this.reach), room * 0.6 / high);
+    else kv = Math.min(Math.max(k, 1.3 * reach), (net.box ? 0.3 * net.box.ry : room * 0.6) / high);
     if (!net.plane && net.x.length < 3) k = kv = Math.min(k, 120);
-    this.flat = this.flat.map(([u, v]) =>
-      [this.width / 2 + (u - (left + right) / 2) * k, this.height / 2 + (v - (top + bottom) / 2) * kv]);
+    net.rows.forEach((node, i) => {
+      const [u, v] = flat[i];
+      this.flat[node] = [middle + (u - (left + right) / 2) * k, (y ?? height / (net.figures.length ? 6 : 2)) + (v - (top + bottom) / 2) * kv];
+      this.way[node] = [0, -reach];
+    });
+  }
+
+  // Puts a figure on its share of the width.
+  fitFigure(figure, i, margin, room) {
+    const { form } = figure, share = (this.width - 2 * margin) / this.net.figures.length, { isBox, tall } = form;
+    const rx = Math.min(share * (isBox ? 0.25 : 0.42), room * (isBox ? 0.62 : form === forms.bar ? 2 : 0.58));
+    Object.assign(figure, {
+      rx, ry: rx * tall, x: margin + share * (i + 0.5) + (isBox ? rx : 0), lift: room * 0.16,
+      y: this.height / 2 - 16 - (form === forms.bell ? -0.6 : form.still && !isBox ? 0.4 : 0) * rx,
+    });
+    figure.nodes.forEach((node, p) => {
+      const [x, y] = this.flat[node] = this.onFigure(figure, figure.spots[p], 0), moved = this.onFigure(figure, figure.spots[p], 1);
+      this.way[node] = [moved[0] - x, moved[1] - y];
+    });
+  }
+
+  // Returns the point of a figure on the canvas. A ring moves outwards, anything else upwards.
+  onFigure({ form, x, y, rx, ry, lift }, [u, v], up) {
+    const grown = form.isRing ? 1 + 0.14 * up : 1, shear = form.lines?.[0] === slab ? -0.6 * ry * v : 0;
+    return [x + u * rx * grown + shear, y + v * ry * grown - (form.isRing ? 0 : lift * up)];
   }
 
   // Converts positions in model units to heights; the recent maximum sets the scale.
   move(positions) {
     this.positions = positions;
-    const start = this.net.start;
+    this.moved = this.displacements(positions.map((x, i) => x - this.net.start[i]));
     let most = 0;
-    for (let i = 0; i < positions.length; i++)
-      if (this.net.kinds[i] !== 'h') most = Math.max(most, Math.abs(positions[i] - start[i]));
+    for (let i = 0; i < this.moved.length; i++) if (this.net.kinds[i] !== 'h') most = Math.max(most, Math.abs(this.moved[i]));
     this.peak = Math.max(most, this.peak * 0.992, 1e-6);
   }
 
-  heights() {
-    const net = this.net, n = net.dots, up = new Float32Array(net.x.length);
-    if (this.mode) {
-      // Shows the mode's shape, slowed down to one period in 1.5 seconds.
-      const swing = Math.sin(performance.now() / 240);
-      for (let i = 0; i < n; i++) up[i] = this.mode[i] * swing;
-    } else {
-      for (let i = 0; i < n; i++) up[i] = (this.positions[i] - net.start[i]) / this.peak;
-    }
-    // A driven input may be far away.
-    for (let i = 0; i < up.length; i++) up[i] = Math.max(-1.6, Math.min(1.6, up[i]));
+  // Returns the displacement of each node. Modes move what the dots do not show.
+  displacements(dots, isMode) {
+    const { net } = this, up = new Float32Array(net.x.length);
+    up.set(dots);
+    for (const [node, terms] of net.rules)
+      if (node >= net.dots || isMode || !terms.length) up[node] = terms.reduce((sum, [mode, weight]) => sum + weight * dots[mode], 0);
+    for (const node of net.hidden) up[node] = 0;
     return up;
   }
+
+  heights() {
+    // Shows the mode's shape, slowed down to one period in 1.5 seconds.
+    const factor = this.mode ? Math.sin(performance.now() / 240) / (Math.max(...this.mode.map(Math.abs)) || 1) : 1 / this.peak;
+    // A driven input may be far away.
+    return (this.mode ?? this.moved).map(x => Math.max(-1.6, Math.min(1.6, x * factor)));
+  }
+
+  // Shows the shape of a mode, or the motion.
+  showMode(shape) { this.mode = shape && this.displacements(shape, true); }
 
   draw() {
     const net = this.net, c = this.context;
@@ -140,17 +258,55 @@ export class NetworkView {
     c.clearRect(0, 0, this.width, this.height);
     if (!net || !this.flat) return;
     const up = this.heights(), { sx, sy } = this;
-    for (let i = 0; i < sx.length; i++) { sx[i] = this.flat[i][0]; sy[i] = this.flat[i][1] - up[i] * this.reach; }
+    for (let i = 0; i < sx.length; i++) { sx[i] = this.flat[i][0] + up[i] * this.way[i][0]; sy[i] = this.flat[i][1] + up[i] * this.way[i][1]; }
+    for (const figure of net.figures) this.figure(c, figure, up);
     this.afterglow(c);
     this.links(c, up);
     this.nodes(c);
+    this.labels(c);
     this.handles(c);
+  }
+
+  // Draws a figure as its places move it.
+  figure(c, figure, up) {
+    const { lines = [], still = [] } = figure.form;
+    c.lineWidth = 1.5;
+    [...still, ...lines].forEach((line, i) => {
+      const isStill = i < still.length;
+      c.beginPath();
+      for (const spot of line) {
+        let all = isStill ? 1 : 0, sum = 0;
+        figure.spots.forEach((place, p) => {
+          const weight = isStill ? 0 : 1 / ((spot[0] - place[0]) ** 2 + (spot[1] - place[1]) ** 2 + 0.02);
+          all += weight; sum += weight * up[figure.nodes[p]];
+        });
+        c.lineTo(...this.onFigure(figure, spot, sum / all));
+      }
+      c.strokeStyle = css(isStill ? 'held' : 'up'); c.fillStyle = css(isStill ? 'ground' : 'proved');
+      c.globalAlpha = isStill ? 1 : 0.3;
+      if (line.length > 10 && line !== inner) c.fill();
+      c.globalAlpha = 1; c.stroke();
+    });
+  }
+
+  // Names the places of figures, the box and the small parts.
+  labels(c) {
+    const { net, flat } = this, write = (text, x, y) => c.fillText(text, x, y);
+    c.fillStyle = css('quiet'); c.font = '12px system-ui, sans-serif'; c.textAlign = 'center'; c.textBaseline = 'top';
+    for (const { form, name = '', names, nodes, spots, x, y, rx, ry, lift } of net.figures) {
+      write(name, x, y + ry + 20);
+      names.forEach((place, p) => {
+        const [u, v] = spots[p], [px, py] = flat[nodes[p]], out = form.isRing ? 0.28 : 0;
+        write(place, px + out * (rx * u + 110 * (v > 0.5)), form === forms.bar ? y + ry + lift : py + out * ry * v + 14 - 16 * (out && v < 0));
+      });
+    }
+    for (const node of net.loose) if (net.kinds[node] !== 'h') write(net.names[node], flat[node][0], flat[node][1] + 12);
   }
 
   // Draws recent positions as an afterglow, like the blur of a sounding string.
   afterglow(c) {
     if (this.net.dots > 700 || this.mode) { this.trail.length = 0; return; }
-    c.strokeStyle = this.colour.up; c.lineWidth = 1;
+    c.strokeStyle = css('up'); c.lineWidth = 1;
     this.trail.forEach((old, age) => {
       c.globalAlpha = 0.05 + 0.13 * age / this.trail.length;
       c.beginPath();
@@ -172,7 +328,7 @@ export class NetworkView {
 
   links(c, up) {
     const { net, sx, sy } = this, thin = net.links.length > 800 ? 1 : 1.6;
-    const bins = this.tints.map(() => new Path2D());
+    const bins = Array.from({ length: 13 }, () => new Path2D()), [spring, down, above] = ['spring', 'down', 'up'].map(css);
     const others = {};
     for (const link of net.links) {
       const [a, b, law] = link, family = net.laws[law][1];
@@ -185,10 +341,10 @@ export class NetworkView {
       }
       path.moveTo(sx[a], sy[a]); path.lineTo(sx[b], sy[b]);
     }
-    bins.forEach((path, i) => { c.strokeStyle = this.tints[i]; c.lineWidth = thin + Math.abs(i - 6) * 0.12; c.stroke(path); });
+    bins.forEach((path, i) => { c.strokeStyle = mixed(spring, i < 6 ? down : above, Math.abs(i - 6) / 6); c.lineWidth = thin + Math.abs(i - 6) * 0.12; c.stroke(path); });
     for (const key in others) {
       const lit = key.endsWith('+');
-      c.strokeStyle = this.colour[lit ? key.slice(0, -1) : key];
+      c.strokeStyle = css(lit ? key.slice(0, -1) : key);
       c.globalAlpha = lit || key === 'bow' ? 1 : 0.5;
       c.lineWidth = lit ? 4 : 1.5;
       c.setLineDash(lit || key === 'bow' ? [] : [4, 4]);
@@ -199,42 +355,39 @@ export class NetworkView {
   }
 
   nodes(c) {
-    const { net, sx, sy } = this, n = net.x.length;
+    const { net, sx, sy } = this, n = net.x.length - net.hidden.size;
     const size = n > 1200 ? 1.1 : n > 300 ? 1.7 : n > 80 ? 2.4 : n > 20 ? 3.4 : 6;
-    const moving = new Path2D(), still = new Path2D(), stems = new Path2D();
-    for (let i = 0; i < n; i++) {
+    const moving = new Path2D(), still = new Path2D();
+    for (let i = 0; i < sx.length; i++) {
       const kind = net.kinds[i];
-      if (kind === 'o') { stems.moveTo(sx[i], this.flat[i][1]); stems.lineTo(sx[i], sy[i]); }
       if (kind === 'g') still.rect(sx[i] - size, sy[i] - size, 2 * size, 2 * size);
-      else if (kind !== 'h' && kind !== 'w') { moving.moveTo(sx[i] + size, sy[i]); moving.arc(sx[i], sy[i], size, 0, 7); }
+      else if (kind === 'm') { moving.moveTo(sx[i] + size, sy[i]); moving.arc(sx[i], sy[i], size, 0, 7); }
     }
-    c.strokeStyle = this.colour.up; c.lineWidth = 3; c.stroke(stems);
-    c.fillStyle = this.colour.held; c.fill(still);
+    c.fillStyle = css('held'); c.fill(still);
     c.globalAlpha = n > 300 ? 0.55 : 1;
-    c.fillStyle = this.colour.mass; c.fill(moving);
+    c.fillStyle = css('mass'); c.fill(moving);
     c.globalAlpha = 1;
   }
 
   handles(c) {
-    const { net, sx, sy } = this;
+    const { net, sx, sy, pull } = this, accent = css('accent');
+    const ring = (node, radius, line, fill) => {
+      c.beginPath(); c.arc(sx[node], sy[node], radius, 0, 7);
+      c.fillStyle = css('card'); c.globalAlpha = fill; c.fill(); c.globalAlpha = 1;
+      c.lineWidth = line; c.strokeStyle = accent; c.stroke();
+    };
+    c.font = '600 10px system-ui, sans-serif'; c.textAlign = 'center'; c.textBaseline = 'middle';
     net.inputs.forEach(([number, node], i) => {
       if (node === null) return;
       const is = i === this.chosen;
-      c.beginPath(); c.arc(sx[node], sy[node], is ? 10 : 7, 0, 7);
-      c.lineWidth = is ? 3 : 2; c.strokeStyle = this.colour.accent; c.fillStyle = this.colour.card;
-      c.globalAlpha = 0.85; c.fill(); c.globalAlpha = 1; c.stroke();
-      c.fillStyle = this.colour.accent; c.font = '600 10px system-ui, sans-serif';
-      c.textAlign = 'center'; c.textBaseline = 'middle';
-      c.fillText(number, sx[node], sy[node] + 0.5);
+      ring(node, is ? 10 : 7, is ? 3 : 2, 0.85);
+      c.fillStyle = accent; c.fillText(number, sx[node], sy[node] + 0.5);
     });
     const node = this.chosen - net.inputs.length;
-    if (node >= 0 && node < net.x.length) {
-      c.beginPath(); c.arc(sx[node], sy[node], 9, 0, 7);
-      c.lineWidth = 3; c.strokeStyle = this.colour.accent; c.stroke();
-    }
-    if (this.pull) {
-      c.beginPath(); c.moveTo(this.pull.from.x, this.pull.from.y); c.lineTo(this.pull.to.x, this.pull.to.y);
-      c.strokeStyle = this.colour.accent; c.lineWidth = 2; c.setLineDash([2, 5]); c.stroke(); c.setLineDash([]);
+    if (node >= 0 && node < net.x.length) ring(node, 9, 3, 0);
+    if (pull) {
+      c.beginPath(); c.moveTo(pull.from.x, pull.from.y); c.lineTo(pull.to.x, pull.to.y);
+      c.lineWidth = 2; c.strokeStyle = accent; c.setLineDash([2, 5]); c.stroke(); c.setLineDash([]);
     }
   }
 
@@ -248,37 +401,29 @@ export class NetworkView {
   // it, else the nearest input.
   targetAt(x, y) {
     if (!this.net) return -1;
-    let best = -1, distance = 1e9;
-    this.net.inputs.forEach(([, node], i) => {
-      if (node === null) return;
-      const d = Math.hypot(this.sx[node] - x, this.sy[node] - y);
-      if (d < distance) { best = i; distance = d; }
-    });
-    const node = distance > 12 ? this.nearestNode(x, y) : -1;
-    return node >= 0 && this.isMass(node) ? this.net.inputs.length + node : best;
-  }
-
-  nearestNode(x, y) {
-    let best = -1, distance = 24;
-    for (let i = 0; this.net && i < this.net.x.length; i++) {
-      const d = Math.hypot(this.sx[i] - x, this.sy[i] - y);
-      if (d < distance) { best = i; distance = d; }
-    }
-    return best;
+    const nearest = (nodes, best, within) => {
+      nodes.forEach((node, i) => {
+        const far = node === null ? within : Math.hypot(this.sx[node] - x, this.sy[node] - y);
+        if (far < within) { best = i; within = far; }
+      });
+      return [best, within];
+    };
+    const [input, far] = nearest(this.net.inputs.map(i => i[1]), -1, 1e9), [node] = nearest(this.net.names.map((_, i) => this.isMass(i) ? i : null), -1, 24);
+    return far > 12 && node >= 0 ? this.net.inputs.length + node : input;
   }
 }
 
-const note = hz => {
+export const noteName = hz => {
   const key = 69 + 12 * Math.log2(hz / 440), k = Math.round(key), cents = Math.round(100 * (key - k));
   return ['C', 'C♯', 'D', 'E♭', 'E', 'F', 'F♯', 'G', 'A♭', 'A', 'B♭', 'B'][((k % 12) + 12) % 12] +
     (Math.floor(k / 12) - 1) + (cents ? (cents > 0 ? ' +' : ' −') + Math.abs(cents) : '');
 };
-export const noteName = note;
 export const hertz = hz => hz >= 1000 ? (hz / 1000).toFixed(2) + ' kHz' : hz.toFixed(hz < 100 ? 2 : 1) + ' Hz';
 
 function prepared(canvas) {
   const ratio = devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight;
-  if (canvas.width !== Math.round(width * ratio)) { canvas.width = Math.round(width * ratio); canvas.height = Math.round(height * ratio); }
+  const wide = Math.round(width * ratio), high = Math.round(height * ratio);
+  if (canvas.width !== wide || canvas.height !== high) Object.assign(canvas, { width: wide, height: high });
   const c = canvas.getContext('2d');
   c.setTransform(ratio, 0, 0, ratio, 0, 0);
   c.clearRect(0, 0, width, height);
@@ -319,13 +464,59 @@ export function spectrumOf(heard) {
   return Float64Array.from({ length: n / 2 }, (_, i) => Math.hypot(re[i], im[i]) * 4 / n);
 }
 
+// Frequencies from 30 Hz to half the rate, as shares of an axis.
+const shareOf = (hz, rate) => Math.log(hz / 30) / Math.log(rate / 60);
+const ticks = { 100: '100 Hz', 1000: '1 kHz', 10000: '10 kHz' };
+
+// The spectra of the last 10 s, from left to right. Another canvas keeps them without the axes.
+export class Spectrogram {
+  time = 0;   // Time of the last column, s.
+  heard = 0;  // Time of the last sound, s.
+  past = document.createElement('canvas').getContext('2d');
+
+  // Adds the spectrum at a time in s. A gap of a second stays empty.
+  add(canvas, magnitudes, rate, now) {
+    const { past } = this, left = 40, seconds = 10, size = past.canvas;
+    const wide = canvas.clientWidth - left, high = canvas.clientHeight - 14, colours = ['card', 'up', 'ink'].map(css);
+    const isOther = size.width !== wide || size.height !== high || this.colour !== colours[0];
+    if (magnitudes.some(m => m > 1e-5)) this.heard = now;
+    if (!isOther && now - this.heard > seconds + 1) return;
+    const gap = isOther || now < this.time ? seconds : Math.min(seconds, now - this.time);
+    const columns = Math.floor(gap * wide / seconds), drawn = gap < 1 ? columns : 1;
+    if (!columns) return;
+    this.time = gap < seconds ? this.time + columns * seconds / wide : now;
+    if (isOther) {
+      Object.assign(size, { width: wide, height: high });
+      [this.colour] = colours;
+      this.palette = Array.from({ length: 64 }, (_, i) => mixed(colours[i >> 5], colours[(i >> 5) + 1], i % 32 / 31));
+    }
+    past.drawImage(size, -columns, 0);
+    past.fillStyle = this.colour;
+    past.fillRect(wide - columns, 0, columns, high);
+    const last = magnitudes.length - 1, bin = y => 60 * magnitudes.length / rate * (rate / 60) ** (1 - y / high);
+    for (let y = 0; y < high; y++) {
+      let most = magnitudes[Math.min(last, Math.round(bin(y + 0.5)))];
+      for (let i = Math.ceil(bin(y + 1)); i < Math.min(last, bin(y)); i++) most = Math.max(most, magnitudes[i]);
+      past.fillStyle = this.palette[Math.max(0, Math.min(63, Math.round(75 + 16 * Math.log10(most + 1e-12))))];
+      past.fillRect(wide - drawn, y, drawn, 1);
+    }
+    const { c, width } = prepared(canvas);
+    c.drawImage(size, left, 0);
+    c.font = '10px system-ui, sans-serif'; c.fillStyle = css('quiet');
+    c.textAlign = 'right';
+    c.fillText('\u221210 s', left, high + 12);
+    c.fillText('0 s', width, high + 12);
+    for (const hz in ticks) c.fillText(ticks[hz], left - 4, high * (1 - shareOf(hz, rate)) + 3);
+  }
+}
+
 export function drawSpectrum(canvas, magnitudes, rate) {
   const { c, width, height } = prepared(canvas), bin = rate / 2 / magnitudes.length;
-  const x = hz => Math.log(hz / 30) / Math.log(rate / 2 / 30) * width, floor = -100;
+  const x = hz => shareOf(hz, rate) * width, floor = -100;
   c.font = '10px system-ui, sans-serif'; c.fillStyle = css('quiet'); c.strokeStyle = css('line'); c.lineWidth = 1;
-  for (const hz of [100, 1000, 10000]) {
+  for (const hz in ticks) {
     c.beginPath(); c.moveTo(x(hz), 0); c.lineTo(x(hz), height - 12); c.stroke();
-    c.fillText(hz < 1000 ? hz + ' Hz' : hz / 1000 + ' kHz', x(hz) + 3, height - 2);
+    c.fillText(ticks[hz], x(hz) + 3, height - 2);
   }
   c.strokeStyle = css('up'); c.fillStyle = css('proved'); c.lineWidth = 1.3; c.beginPath(); c.moveTo(0, height - 12);
   let sum = 0, best = 0;

@@ -1,6 +1,6 @@
 // The page of the running program. It sends OSC, and receives three streams: /describe and /network
 // once per model, /events ten times a second, /motion thirty times a second.
-import { NetworkView, drawScope, drawSpectrum, hertz, noteName, spectrumOf } from '/draw.js';
+import { NetworkView, Spectrogram, drawScope, drawSpectrum, hertz, noteName, spectrumOf } from '/draw.js';
 
 const $ = id => document.getElementById(id);
 const make = (name, text, attributes = {}) => {
@@ -10,6 +10,14 @@ const make = (name, text, attributes = {}) => {
   return element;
 };
 
+const on = (element, name, action) => element.addEventListener(name, action);
+const box = name => make('div', undefined, { class: name });
+const itemOf = (...contents) => {
+  const item = make('li');
+  item.append(...contents);
+  return item;
+};
+const write = texts => Object.entries(texts).forEach(([id, text]) => { $(id).textContent = text; });
 const counted = (count, one, more) => `${count} ${count === 1 ? one : more}`;
 
 // --- OSC ---------------------------------------------------------------------------------------
@@ -24,9 +32,7 @@ function packet(address, ...values) {
   const parts = [padded(address), padded(',' + values.map(v => typeof v === 'string' ? 's' : 'f').join(''))];
   for (const value of values) {
     if (typeof value === 'string') { parts.push(padded(value)); continue; }
-    const number = new DataView(new ArrayBuffer(4));
-    number.setFloat32(0, value);
-    parts.push(new Uint8Array(number.buffer));
+    parts.push(new Uint8Array(new Float32Array([value]).buffer).reverse());  // big-endian
   }
   return new Blob(parts);
 }
@@ -34,7 +40,7 @@ function packet(address, ...values) {
 // Sends one packet at a time, in order; of a slider only the latest waiting value.
 const waiting = [];
 let isSending = false;
-export function say(address, ...values) {
+function say(address, ...values) {
   if (/^\/(param|control)\//.test(address) || address.endsWith('/position') || address.endsWith('/bow')) {
     const old = waiting.findIndex(w => w[0] === address);
     if (old >= 0) waiting.splice(old, 1);
@@ -83,12 +89,13 @@ async function loadModel() {
   $('name').textContent = model.name;
   $('description').textContent = model.description ||
     `${counted(model.masses, 'mass', 'masses')}, ${counted(model.link_count, 'link', 'links')}`;
+  desks.length = 0;
   showKnobs();
   showSliders();
   showScenes();
   $('modes').replaceChildren();
   $('find-modes').hidden = false;
-  view.mode = null;
+  view.showMode(null);
   model.warnings.forEach(complain);
 }
 
@@ -97,19 +104,17 @@ async function loadNetwork() {
   isFetching = true;
   try {
     const net = await json('/network');
-    const isOther = !view.net || net.dots !== view.net.dots || net.x.length !== view.net.x.length;
     picture = net.picture;
-    if (isOther || view.named !== model?.name) { view.setNetwork(net); view.named = model?.name; }
-    const seen = new Set(net.links.map(l => net.laws[l[2]][1]));
-    const legend = ['spring', 'pluck', 'bow', 'contact'].filter(f => seen.has(f)).map(family => [family, { spring: 'spring', pluck: 'plectrum', bow: 'bow', contact: 'contact, lit while it touches' }[family]]);
-    if (net.kinds.includes('o')) legend.push(['body', 'modes of a body, the lowest first']);
-    if (net.inputs.length) legend.push(['input', 'input: drag to play']);
+    const key = [model?.name, net.dots, net.x.length].join();
+    if (model && key !== view.key) { view.setNetwork(net, model); view.key = key; }
+    const families = new Set(net.links.map(l => net.laws[l[2]][1]));
+    if (net.inputs.length) families.add('input');
+    const legend = Object.entries({ spring: 'spring', pluck: 'plectrum', bow: 'bow', contact: 'contact, lit while it touches', input: 'input: drag to play' })
+      .filter(([kind]) => families.has(kind));
     $('legend').replaceChildren(...legend.map(([kind, text]) => {
-      const item = make('li', text);
-      item.prepend(make('i', undefined, { class: 'k-' + kind }));
-      return item;
+      return itemOf(make('i', undefined, { class: 'k-' + kind }), text);
     }));
-    if (net.masses > net.dots) $('hint').textContent = `${net.dots} of ${net.masses} masses are drawn`;
+    $('hint').textContent = net.masses > net.dots ? `${net.dots} of ${net.masses} masses are drawn` : '';
   } catch { setTimeout(loadNetwork, 500); } finally { isFetching = false; }
 }
 
@@ -118,20 +123,21 @@ async function loadNetwork() {
 let serial = 0;
 function listen() {
   const events = new EventSource('/events');
-  events.addEventListener('loaded', async event => {
+  on(events, 'loaded', async event => {
     const now = JSON.parse(event.data).serial;
     if (now !== serial) { serial = now; await loadModel(); await loadNetwork(); }
   });
-  events.addEventListener('values', event => {
+  on(events, 'values', event => {
     for (const [name, value] of Object.entries(JSON.parse(event.data))) showValue(name, value);
   });
-  events.addEventListener('status', event => { status = JSON.parse(event.data); showStatus(); });
-  events.addEventListener('news', event => complain(JSON.parse(event.data)));
+  on(events, 'mapping', event => { mapping = JSON.parse(event.data); showMapping(); });
+  on(events, 'status', event => { status = JSON.parse(event.data); showStatus(); });
+  on(events, 'news', event => complain(JSON.parse(event.data)));
   events.onerror = () => { $('description').textContent = 'the program is gone; waiting for it'; };
   events.onopen = () => { if (model) $('description').textContent = model.description; };
 }
 
-let isSlow = false, heard = null, motionFrames = 0, watcher = null;
+let isSlow = false, heard = null, played = 0, motionFrames = 0, watcher = null;
 async function watch() {
   while (!document.hidden) {
     watcher = new AbortController();
@@ -162,44 +168,50 @@ function takeFrames(bytes) {
     if (number !== picture) loadNetwork();
     else if (view.net && dots === view.net.dots) view.move(floats.subarray(0, dots));
     heard = floats.subarray(dots);
+    played = Number(head.getBigUint64(0, true));
     bytes = bytes.slice(size);
   }
 }
-$('slow').addEventListener('click', () => {
+on($('slow'), 'click', () => {
   isSlow = !isSlow;
   $('slow').setAttribute('aria-pressed', isSlow);
   watcher?.abort();
   watch();
 });
-document.addEventListener('visibilitychange', () => document.hidden ? watcher?.abort() : watch());
+on(document, 'visibilitychange', () => document.hidden ? watcher?.abort() : watch());
 
-let drawn = 0;
+const spectrogram = new Spectrogram;
+let drawn = 0, painted = null;
+const isSeen = canvas => canvas.getBoundingClientRect().bottom > 0 && canvas.getBoundingClientRect().top < innerHeight;
 function paint() {
   view.draw();
-  if (heard && drawn++ % 4 === 0) {
-    drawScope($('scope'), heard);
-    const found = drawSpectrum($('spectrum'), spectrumOf(heard), status.rate || 48000);
-    $('centroid').textContent = status.centroid_hz ? hertz(status.centroid_hz) : '–';
-    $('spread').textContent = status.spread_hz ? hertz(status.spread_hz) : '–';
-    $('flatness').textContent = status.flatness ? status.flatness < 1e-3 ? 'below 0.001' : status.flatness.toPrecision(2) : '–';
-    $('loudest').textContent = found ? hertz(found.peak) : '–';
-    $('loudest-note').textContent = found ? noteName(found.peak) : '';
-    const most = view.peak > 1e-6 ? view.peak.toPrecision(2) : '0';
-    $('scale').textContent = view.mode ? 'a mode, slowed down' : isSlow ? 'two seconds a period' : `largest swing ${most}`;
+  if (heard !== painted && drawn++ % 4 === 0) {
+    painted = heard;
+    const rate = status.rate || 48000, spectrum = spectrumOf(heard);
+    if (isSeen($('scope'))) drawScope($('scope'), heard);
+    const found = drawSpectrum($('spectrum'), spectrum, rate);
+    if (isSeen($('spectrogram'))) spectrogram.add($('spectrogram'), spectrum, rate, played / rate);
+    const { centroid_hz, spread_hz, flatness } = status, most = view.peak > 1e-6 ? view.peak.toPrecision(2) : '0';
+    write({
+      centroid: centroid_hz ? hertz(centroid_hz) : '–', spread: spread_hz ? hertz(spread_hz) : '–',
+      flatness: flatness ? flatness < 1e-3 ? 'below 0.001' : flatness.toPrecision(2) : '–',
+      loudest: found ? hertz(found.peak) : '–', 'loudest-note': found ? noteName(found.peak) : '',
+      scale: view.mode ? 'a mode, slowed down' : isSlow ? 'two seconds a period' : `largest swing ${most}`,
+    });
   }
   requestAnimationFrame(paint);
 }
 
 function showStatus() {
-  const peak = status.peak_db ?? -999;
+  const { cpu, energy, voices, xruns } = status, peak = status.peak_db ?? -999;
   $('peak').value = Math.max(-60, peak);
-  $('peak-text').textContent = peak > -120 ? peak.toFixed(1) + ' dBFS' : 'silent';
-  $('voices').textContent = `${status.voices} of ${status.max_voices}`;
-  $('load').textContent = status.cpu < 0 ? 'not running' : (100 * status.cpu).toFixed(0) + ' %';
-  $('load').className = status.cpu > 0.8 ? 'alarm' : '';
-  $('xruns').textContent = status.xruns;
-  $('xruns').className = status.xruns > 0 ? 'alarm' : '';
-  $('energy').textContent = status.energy ? status.energy.toPrecision(2) : status.whole || !status.voices ? '0' : 'in modes';
+  write({
+    'peak-text': peak > -120 ? peak.toFixed(1) + ' dBFS' : 'silent', voices: `${voices} of ${status.max_voices}`,
+    load: cpu < 0 ? 'not running' : (100 * cpu).toFixed(0) + ' %', xruns,
+    energy: energy ? energy.toPrecision(2) : status.whole || !voices ? '0' : 'in modes',
+  });
+  $('load').className = cpu > 0.8 ? 'alarm' : '';
+  $('xruns').className = xruns > 0 ? 'alarm' : '';
 }
 
 // --- parameters --------------------------------------------------------------------------------------
@@ -208,65 +220,50 @@ const digits = value => Math.abs(value) >= 1e5 || (value !== 0 && Math.abs(value
   ? value.toExponential(3) : String(+value.toPrecision(5));
 const sliders = new Map();
 
+// Makes the slider of a parameter, or of an address of the preset.
+function makeSlider(info) {
+  const { name, minimum, maximum, lowest = 0, highest = null, address = '/param/' + name } = info;
+  const id = 'p-' + name, isLog = minimum > 0 && maximum / minimum > 20, ratio = maximum / minimum;
+  const to = v => isLog ? Math.log(v / minimum) / Math.log(ratio) : (v - minimum) / (maximum - minimum || 1);
+  const from = s => isLog ? minimum * ratio ** s : minimum + s * (maximum - minimum);
+  const row = box('slider'), track = box('track');
+  const output = make('output', '', { for: id }), proved = make('span', undefined, { class: 'proved' });
+  const input = make('input', undefined, { id, type: 'range', min: 0, max: 1, step: 0.001, 'aria-describedby': id + '-range' });
+  input.disabled = info.audio_input > 0;
+  const write = value => {
+    output.textContent = digits(value);
+    input.setAttribute('aria-valuetext', digits(value));
+  };
+  on(input, 'input', () => {
+    const value = from(+input.value);
+    write(value);
+    say(address, value);
+  });
+  const clamp = v => Math.min(1, Math.max(0, v));
+  const low = lowest === null ? 0 : clamp(to(lowest) || 0), high = highest === null ? 1 : clamp(to(highest));
+  proved.style.left = 100 * low + '%';
+  proved.style.width = 100 * Math.max(0, high - low) + '%';
+  track.append(proved, input);
+  const limits = [lowest > 0 ? 'above ' + digits(lowest) : '', highest !== null ? 'below ' + digits(highest) : ''].filter(Boolean).join(' and ');
+  row.append(make('label', name, { for: id }), output, track,
+    make('small', info.audio_input > 0 ? `given by audio input ${info.audio_input}` : limits ? 'proved stable ' + limits : 'stable anywhere', { id: id + '-range' }));
+  if (!info.audio_input) row.append(makeDesk(name, name));
+  const show = value => {
+    if (document.activeElement === input && input.matches(':active')) return;
+    input.value = to(value);
+    write(value);
+    info.value = value;
+    showLimits();
+  };
+  sliders.set(name, show);
+  if (info.value !== undefined) show(info.value);
+  return row;
+}
+
 function showSliders() {
   sliders.clear();
-  const rows = model.parameters.map(info => {
-    const row = make('div', undefined, { class: 'slider' });
-    const id = 'p-' + info.name, isLog = info.minimum > 0 && info.maximum / info.minimum > 20;
-    const to = v => isLog ? Math.log(v / info.minimum) / Math.log(info.maximum / info.minimum)
-      : (v - info.minimum) / (info.maximum - info.minimum || 1);
-    const from = s => isLog ? info.minimum * (info.maximum / info.minimum) ** s
-      : info.minimum + s * (info.maximum - info.minimum);
-    const output = make('output', '', { for: id });
-    const input = make('input', undefined, {
-      id, type: 'range', min: 0, max: 1, step: 0.001, 'aria-describedby': id + '-range',
-    });
-    input.disabled = info.audio_input > 0;
-    input.addEventListener('input', () => {
-      const value = from(+input.value);
-      output.textContent = digits(value);
-      input.setAttribute('aria-valuetext', digits(value));
-      say('/param/' + info.name, value);
-    });
-    const track = make('div', undefined, { class: 'track' });
-    const proved = make('span', undefined, { class: 'proved' });
-    const clamp = v => Math.min(1, Math.max(0, v));
-    const low = info.lowest === null ? 0 : clamp(to(info.lowest) || 0);
-    const high = info.highest === null ? 1 : clamp(to(info.highest));
-    proved.style.left = 100 * low + '%';
-    proved.style.width = 100 * Math.max(0, high - low) + '%';
-    track.append(proved, input);
-    const limits = info.lowest > 0 || info.highest !== null
-      ? 'proved stable ' + [info.lowest > 0 ? 'above ' + digits(info.lowest) : '',
-        info.highest !== null ? 'below ' + digits(info.highest) : ''].filter(Boolean).join(' and ')
-      : 'stable anywhere';
-    row.append(make('label', info.name, { for: id }), output, track,
-      make('small', info.audio_input > 0 ? `given by audio input ${info.audio_input}` : limits, { id: id + '-range' }));
-    const show = value => {
-      if (document.activeElement === input && input.matches(':active')) return;
-      input.value = to(value);
-      output.textContent = digits(value);
-      input.setAttribute('aria-valuetext', digits(value));
-      info.value = value;
-      showLimits();
-    };
-    sliders.set(info.name, show);
-    show(info.value);
-    return row;
-  });
-  for (const address of model.controls) {
-    const row = make('div', undefined, { class: 'slider' }), id = 'c' + address.replaceAll('/', '-');
-    const input = make('input', undefined, { id, type: 'range', min: 0, max: 1, step: 0.001 });
-    const output = make('output', '', { for: id });
-    input.addEventListener('input', () => { output.textContent = (+input.value).toFixed(2); say(address, +input.value); });
-    const track = make('div', undefined, { class: 'track' });
-    track.append(input);
-    row.append(make('label', address, { for: id }), output, track);
-    rows.push(row);
-  }
-  if (!rows.length)
-    rows.push(make('p', 'This model has no parameters.', {class: 'quiet'}));
-  $('sliders').replaceChildren(...rows);
+  const rows = [...model.parameters, ...model.controls.map(name => ({ name, address: name, minimum: 0, maximum: 1 }))].map(makeSlider);
+  $('sliders').replaceChildren(...rows.length ? rows : [make('p', 'This model has no parameters.', { class: 'quiet' })]);
 }
 function showValue(name, value) { (knobs.get(name) ?? sliders.get(name))?.(value); }
 
@@ -290,19 +287,48 @@ function showLimits() {
           (100 * share).toFixed(0)} % of it.`;
 }
 
+// --- controllers ---------------------------------------------------------------------------------
+
+let mapping = { waiting: '', rows: [] };
+const desks = [];  // Functions that show the controller of a knob or slider.
+const showMapping = () => desks.forEach(show => show());
+
+// Shows which controllers move a target, and a button that assigns the next one that moves, or
+// takes the assigned one away. `cc`: the preset's controller.
+function makeDesk(target, name, cc) {
+  const text = make('small'), button = make('button'), desk = box('desk');
+  const isOf = row => row.to.toLowerCase().replaceAll(' ', '-') === target.toLowerCase() || row.to === 'cc' + cc;
+  desks.push(() => {
+    const rows = mapping.rows.filter(isOf), isLearnt = rows.some(row => row.learned), waits = mapping.waiting === target;
+    const all = rows.map(row => (row.learned ? 'learnt: ' : '') + row.from.replace('cc', 'CC ') + (row.relative ? ', relative' : ''));
+    if (cc !== undefined && !mapping.rows.some(row => row.from === 'cc' + cc)) all.push('CC ' + cc);
+    text.textContent = waits ? 'move a knob…' : all.join('; ');
+    button.textContent = waits ? 'Cancel' : isLearnt ? 'Forget' : 'Learn';
+    button.setAttribute('aria-label', `${button.textContent} the controller of ${name}`);
+    button.onclick = () => say(waits || isLearnt ? '/unlearn' : '/learn', target);
+  });
+  desks.at(-1)();
+  desk.append(text, button);
+  return desk;
+}
+
 // --- the named controls --------------------------------------------------------------------------
 
 const knobs = new Map();  // Maps each address to the function that shows its position.
 
+let grip = null;  // The knob that a pointer holds.
+on(window, 'pointermove', event => { if (grip?.id === event.pointerId) grip.move(event); });
+for (const end of ['pointerup', 'pointercancel']) on(window, end, event => { if (grip?.id === event.pointerId) grip = null; });
+
 // Makes a knob: drag it up or to the right, turn the wheel, or use the keys of a slider.
-function makeKnob({ name, address, help, value: start }) {
+function makeKnob({ name, address, help, controller, value: start }) {
   const step = { ArrowUp: 0.01, ArrowRight: 0.01, ArrowDown: -0.01, ArrowLeft: -0.01, PageUp: 0.1, PageDown: -0.1, Home: -1, End: 1 };
   const dial = make('div', undefined, {
     class: 'dial', role: 'slider', tabindex: 0, 'aria-label': name, title: help,
     'aria-valuemin': 0, 'aria-valuemax': 100,
   });
   const output = make('output');
-  let value = start, told = start, isHeld = false, waits = 0;
+  let value = start, told = start, waits = 0;
   const show = to => {
     value = Math.min(1, Math.max(0, to));
     dial.style.setProperty('--turn', value);
@@ -314,35 +340,29 @@ function makeKnob({ name, address, help, value: start }) {
     show(to);
     say(address, value);
     clearTimeout(waits);
-    waits = setTimeout(() => { waits = 0; if (!isHeld) show(told); }, 600);
+    waits = setTimeout(() => { waits = 0; if (grip?.dial !== dial) show(told); }, 600);
   };
-  dial.addEventListener('keydown', event => {
+  on(dial, 'keydown', event => {
     if (!(event.key in step)) return;
     turn(value + step[event.key]);
     event.preventDefault();
   });
-  dial.addEventListener('pointerdown', event => {
-    const from = value, way = at => at.clientX - at.clientY, ends = new AbortController();
-    const follow = (name, action) => addEventListener(name, at => {
-      if (at.pointerId === event.pointerId) action(at);
-    }, { signal: ends.signal });
-    const release = () => { isHeld = false; ends.abort(); };
-    isHeld = true;
-    follow('pointermove', at => turn(from + (way(at) - way(event)) / 200));
-    follow('pointerup', release);
-    follow('pointercancel', release);
+  const way = at => at.clientX - at.clientY;
+  on(dial, 'pointerdown', event => {
+    const from = value, start = way(event);
+    grip = { id: event.pointerId, dial, move: at => turn(from + (way(at) - start) / 200) };
   });
-  dial.addEventListener('wheel', event => {
+  on(dial, 'wheel', event => {
     turn(value - Math.sign(event.deltaY) * 0.02);
     event.preventDefault();
-  }, { passive: false });
+  });
   show(start);
   knobs.set(address, to => {
     told = to;
-    if (!isHeld && !waits) show(to);
+    if (grip?.dial !== dial && !waits) show(to);
   });
-  const knob = make('div', undefined, { class: 'knob' });
-  knob.append(dial, make('span', name), output);
+  const knob = box('knob');
+  knob.append(dial, make('span', name), output, makeDesk(address.slice(9), name, controller));
   return knob;
 }
 
@@ -354,7 +374,7 @@ function showKnobs() {
 
 // --- modes ---------------------------------------------------------------------------------------------
 
-$('find-modes').addEventListener('click', async () => {
+on($('find-modes'), 'click', async () => {
   $('modes-text').textContent = 'Searching for the modes…';
   try {
     const found = await json('/modes?count=24');
@@ -362,25 +382,18 @@ $('find-modes').addEventListener('click', async () => {
     $('find-modes').hidden = true;
     $('modes-text').textContent = (found.linear ? '' : 'Without contacts, bows and plectra. ') +
         'Choose one to see its shape, again to see it play.';
-    $('modes').replaceChildren(...found.modes.map((mode, i) => {
-      const button = make('button', hertz(mode.hz), { 'aria-pressed': 'false' });
-      button.append(make('small', `${noteName(mode.hz)}, ${mode.t60_s === null ? 'never decays' : 'T60 ' + mode.t60_s.toPrecision(2) + ' s'}`));
+    $('modes').replaceChildren(...found.modes.map(mode => {
       const by = mode.inputs.map(([number, db]) => `input ${number} ${db === null ? 'not at all' : db + ' dB'}`).slice(0, 3).join(', ');
-      if (by)
-        button.append(make('small', by, {
-          title:
-              'Level at which each input excites this mode, relative to the mode that it excites most'
-        }));
-      button.setAttribute('aria-label', `Mode ${i + 1}, ${hertz(mode.hz)}; ${by}`);
-      button.addEventListener('click', () => {
+      const button = make('button', hertz(mode.hz), { 'aria-pressed': 'false' });
+      button.append(make('small', `${noteName(mode.hz)}, ${mode.t60_s === null ? 'never decays' : 'T60 ' + mode.t60_s.toPrecision(2) + ' s'}`),
+        make('small', by, { title: 'Level at which each input excites this mode, relative to the mode that it excites most' }));
+      on(button, 'click', () => {
         const on = button.getAttribute('aria-pressed') === 'true';
         document.querySelectorAll('#modes button').forEach(b => b.setAttribute('aria-pressed', 'false'));
         if (!on && of === serial) button.setAttribute('aria-pressed', 'true');
-        view.mode = on || mode.shape.length !== view.net?.dots ? null : mode.shape;
+        view.showMode(on || mode.shape.length !== view.net?.dots ? null : mode.shape);
       });
-      const item = make('li');
-      item.append(button);
-      return item;
+      return itemOf(button);
     }));
     if (!found.modes.length)
       $('modes-text').textContent = 'This network has no modes.';
@@ -395,7 +408,7 @@ const favourites = new Set(JSON.parse(localStorage.getItem('favourites') ?? '[]'
 
 function makeStar(name) {
   const star = make('button', '\u2605', { class: 'star', 'aria-label': `Favourite: ${name}`, 'aria-pressed': favourites.has(name) });
-  star.addEventListener('click', () => {
+  on(star, 'click', () => {
     if (!favourites.delete(name)) favourites.add(name);
     star.setAttribute('aria-pressed', favourites.has(name));
     localStorage.setItem('favourites', JSON.stringify([...favourites]));
@@ -414,22 +427,21 @@ function showScenes() {
       const button = make('button', name);
       if (name === model.name) button.setAttribute('aria-current', 'true');
       button.append(make('small', line));
-      button.addEventListener('click', () => {
+      on(button, 'click', () => {
         $('library').close();
         $('description').textContent = `loading ${name}…`;
         say(address, name);
       });
-      const item = make('li');
-      item.append(button, makeStar(name));
-      return item;
+      return itemOf(button, makeStar(name));
     }));
 }
-$('filter').addEventListener('input', showScenes);
-$('choose').addEventListener('click', () => { showScenes(); $('library').showModal(); $('filter').focus(); });
-$('panic').addEventListener('click', () => say('/panic'));
+on($('filter'), 'input', showScenes);
+on($('choose'), 'click', () => { showScenes(); $('library').showModal(); $('filter').focus(); });
+on($('panic'), 'click', () => say('/panic'));
 
 // --- keys ------------------------------------------------------------------------------------------------
 
+const isEnter = event => event.key === 'Enter' || event.key === ' ';
 const letters = 'awsedftgyhujkolp';
 const down = new Map();  // Maps each pressed letter or pointer to its key.
 const keyButtons = new Map();
@@ -461,35 +473,34 @@ function showKeys() {
   }));
 }
 const keyAt = event => document.elementFromPoint(event.clientX, event.clientY)?.closest('[data-key]')?.dataset.key;
-$('keyboard').addEventListener('pointerdown', event => {
+on($('keyboard'), 'pointerdown', event => {
   const key = keyAt(event);
   if (key === undefined) return;
   event.target.releasePointerCapture?.(event.pointerId);
   press('pointer' + event.pointerId, +key, 60 + Math.round(60 * Math.min(1, event.offsetY / 80)));
 });
-$('keyboard').addEventListener('pointermove', event => {
+on($('keyboard'), 'pointermove', event => {
   const by = 'pointer' + event.pointerId;
   if (!down.has(by)) return;
   const key = keyAt(event);
   if (key !== undefined && +key !== down.get(by)) { lift(by); press(by, +key); }
 });
-for (const end of ['pointerup', 'pointercancel']) addEventListener(end, event => lift('pointer' + event.pointerId));
-$('keyboard').addEventListener('keydown', event => {
+for (const end of ['pointerup', 'pointercancel']) on(window, end, event => lift('pointer' + event.pointerId));
+on($('keyboard'), 'keydown', event => {
   const at = event.target.closest('[data-key]'), step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
   if (step && at) {
     const next = keyButtons.get(+at.dataset.key + step);
     if (next) { at.tabIndex = -1; next.tabIndex = 0; next.focus(); }
     event.preventDefault();
-  } else if ((event.key === ' ' || event.key === 'Enter') && at && !event.repeat) {
+  } else if (isEnter(event) && at && !event.repeat) {
     press('focus', +at.dataset.key);
     event.preventDefault();
   }
 });
-$('keyboard').addEventListener('keyup', event => { if (event.key === ' ' || event.key === 'Enter') lift('focus'); });
-const isTyping = event => /^(INPUT|TEXTAREA)$/.test(event.target.tagName) && event.target.type === 'search';
-addEventListener('keydown', event => {
+on($('keyboard'), 'keyup', event => { if (isEnter(event)) lift('focus'); });
+on(window, 'keydown', event => {
   if (event.key === 'Escape' && !$('library').open) return say('/panic');
-  if (isTyping(event) || event.ctrlKey || event.metaKey || event.altKey || event.repeat) return;
+  if (event.target.type === 'search' || event.ctrlKey || event.metaKey || event.altKey || event.repeat) return;
   const at = letters.indexOf(event.key.toLowerCase());
   if (at >= 0) press('letter' + event.code, octave + 12 + at);
   if (event.key === 'z' || event.key === 'x') {
@@ -497,9 +508,9 @@ addEventListener('keydown', event => {
     showKeys();
   }
 });
-addEventListener('keyup', event => lift('letter' + event.code));
-addEventListener('blur', () => [...down.keys()].forEach(lift));
-addEventListener('resize', showKeys);
+on(window, 'keyup', event => lift('letter' + event.code));
+on(window, 'blur', () => [...down.keys()].forEach(lift));
+on(window, 'resize', showKeys);
 
 // --- playing on the picture ------------------------------------------------------------------------------
 
@@ -512,29 +523,27 @@ function wayOf(chosen) {
   const known = info.gestures;
   return { info, way: info.is_force ? 'strike' : known.includes('pluck') ? 'pluck' : known.includes('bow') ? 'bow' : 'move' };
 }
-const restOf = info => {
-  const node = view.net.inputs.find(i => i[0] === info.number)?.[1];
-  return node === null || node === undefined ? 0 : view.net.start[node];
-};
-const saidOf = { hit: 'drag and let go to strike', strike: 'drag and let go to strike', pluck: 'drag and let go to pluck', bow: 'drag to bow', move: 'drag to move' };
+const restOf = info => view.net.start[view.net.inputs.find(i => i[0] === info.number)?.[1]] ?? 0;
+const saidOf = { pluck: 'drag and let go to pluck', bow: 'drag to bow', move: 'drag to move' };
 let held = null;
 
-function hint(chosen) {
-  const way = chosen < 0 ? null : wayOf(chosen);
-  const what = way?.way === 'hit' ? way.info.name : `input ${way?.info.number}${way?.info.attached_to ? ' at ' + way.info.attached_to : ''}`;
-  $('hint').textContent = way ? `${what}: ${saidOf[way.way]}` : '';
+function choose(chosen) {
+  const { info, way } = (chosen >= 0 && wayOf(chosen)) || {};
+  view.chosen = chosen;
+  $('hint').textContent = !way ? '' : `${way === 'hit' ? info.name : `input ${info.number}${info.attached_to ? ' at ' + info.attached_to : ''}`}: ${saidOf[way] ?? 'drag and let go to strike'}`;
 }
+const play = (info, gesture, ...values) => say(`/in/${info.number}/${gesture}`, ...values);
 function release(chosen, strength) {
   const { info, way } = wayOf(chosen) ?? {};
   if (way === 'hit') say(`/mass/${info.name}/strike`, strength);
-  if (way === 'strike') say(`/in/${info.number}/force`, info.blow * strength, 0);
-  if (way === 'pluck') say(`/in/${info.number}/pluck`, strength);
-  if (way === 'bow') say(`/in/${info.number}/bow`, 0, 0.5);
-  if (way === 'move') say(`/in/${info.number}/position`, restOf(info));
+  if (way === 'strike') play(info, 'force', info.blow * strength, 0);
+  if (way === 'pluck') play(info, 'pluck', strength);
+  if (way === 'bow') play(info, 'bow', 0, 0.5);
+  if (way === 'move') play(info, 'position', restOf(info));
 }
 const canvas = $('network');
 const point = event => ({ x: event.offsetX, y: event.offsetY });
-canvas.addEventListener('pointerdown', event => {
+on(canvas, 'pointerdown', event => {
   const at = point(event), chosen = view.targetAt(at.x, at.y);
   if (chosen < 0) return;
   canvas.setPointerCapture(event.pointerId);
@@ -543,59 +552,50 @@ canvas.addEventListener('pointerdown', event => {
   const node = view.nodeOf(chosen);
   view.pull = { from: { x: view.sx[node], y: view.sy[node] }, to: at };
 });
-canvas.addEventListener('pointermove', event => {
+on(canvas, 'pointermove', event => {
   const at = point(event);
   if (!held) {
     const chosen = view.targetAt(at.x, at.y), node = chosen < 0 ? -1 : view.nodeOf(chosen);
-    view.chosen = node >= 0 && Math.hypot(view.sx[node] - at.x, view.sy[node] - at.y) < 60 ? chosen : -1;
-    hint(view.chosen);
-    return;
+    return choose(node >= 0 && Math.hypot(view.sx[node] - at.x, view.sy[node] - at.y) < 60 ? chosen : -1);
   }
   if (event.pointerId !== held.id) return;
   view.pull.to = at;
   const { info, way } = wayOf(held.chosen) ?? {};
   if (way === 'bow') {
     const speed = (at.x - held.last.x) / Math.max(1, event.timeStamp - held.time);
-    const drawn = Math.max(-1, Math.min(1, speed * 0.8)) || 0.02;
-    const pressure = Math.max(0.05, Math.min(1, 0.4 + (at.y - held.from.y) / 300));
-    say(`/in/${info.number}/bow`, drawn, pressure);
-  } else if (way === 'move') {
-    say(`/in/${info.number}/position`, (restOf(info)) - (at.y - held.from.y) / 100 * info.blow);
+    play(info, 'bow', Math.max(-1, Math.min(1, speed * 0.8)) || 0.02, Math.max(0.05, Math.min(1, 0.4 + (at.y - held.from.y) / 300)));
   }
+  if (way === 'move') play(info, 'position', restOf(info) - (at.y - held.from.y) / 100 * info.blow);
   held.last = at; held.time = event.timeStamp;
 });
-const letGo = event => {
-  if (!held || event.pointerId !== held.id) return;
+for (const end of ['pointerup', 'pointercancel']) on(canvas, end, event => {
+  if (event.pointerId !== held?.id) return;
   const far = Math.hypot(held.last.x - held.from.x, held.last.y - held.from.y);
-  if (event.type === 'pointerup') release(held.chosen, far < 6 ? 0.6 : Math.min(1, 0.15 + far / 140));
-  held = null;
-  view.pull = null;
-};
-canvas.addEventListener('pointerup', letGo);
-canvas.addEventListener('pointercancel', letGo);
-canvas.addEventListener('pointerleave', () => { if (!held) { view.chosen = -1; $('hint').textContent = ''; } });
-canvas.addEventListener('keydown', event => {
+  if (end === 'pointerup') release(held.chosen, far < 6 ? 0.6 : Math.min(1, 0.15 + far / 140));
+  held = view.pull = null;
+});
+on(canvas, 'pointerleave', () => { if (!held) choose(-1); });
+on(canvas, 'keydown', event => {
   const count = view.net ? view.net.inputs.length + view.net.dots : 0, step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
-  if (!count) return;
+  if (!count || !(step || isEnter(event))) return;
+  event.preventDefault();
+  let { chosen } = view;
   if (step) {
-    do view.chosen = (view.chosen + step + count) % count; while (!wayOf(view.chosen) && view.chosen > 0);
-    hint(view.chosen);
-    event.preventDefault();
-  }
-  if ((event.key === 'Enter' || event.key === ' ') && !event.repeat && view.chosen >= 0) {
-    const { info, way } = wayOf(view.chosen) ?? {};
-    if (way === 'bow') say(`/in/${info.number}/bow`, 0.6, 0.5);
-    else if (way === 'move') { say(`/in/${info.number}/position`, (restOf(info)) + info.blow); setTimeout(() => release(view.chosen, 0), 120); }
-    else release(view.chosen, 0.6);
-    event.preventDefault();
+    do chosen = (chosen + step + count) % count; while (!wayOf(chosen) && chosen > 0);
+    choose(chosen);
+  } else if (!event.repeat && chosen >= 0) {
+    const { info, way } = wayOf(chosen) ?? {};
+    if (way === 'bow') play(info, 'bow', 0.6, 0.5);
+    else if (way === 'move') { play(info, 'position', restOf(info) + info.blow); setTimeout(() => release(chosen, 0), 120); }
+    else release(chosen, 0.6);
   }
 });
-canvas.addEventListener('keyup', event => {
-  if ((event.key === 'Enter' || event.key === ' ') && view.chosen >= 0 && wayOf(view.chosen)?.way === 'bow') release(view.chosen, 0);
+on(canvas, 'keyup', event => {
+  if (isEnter(event) && view.chosen >= 0 && wayOf(view.chosen)?.way === 'bow') release(view.chosen, 0);
 });
 
 // Exposes received data to the tests.
-globalThis.panel = { view, say, get frames() { return motionFrames; }, get status() { return status; }, get heard() { return heard; } };
+globalThis.panel = { view, spectrogram, say, get frames() { return motionFrames; }, get status() { return status; }, get heard() { return heard; } };
 
 showKeys();
 listen();

@@ -197,6 +197,29 @@ TEST_CASE("a waveguide's drawing matches its displacement", "[panel]") {
   }
 }
 
+TEST_CASE("the drawing names the places of a body, and the strings", "[panel]") {
+  const std::string text =
+      "@bell body 1. clapper left right\n@b1 mode @bell 200. 3. 1. 0.5 -0.5\n"
+      "@b2 mode @bell 500. 3. 0.2 -0.8 0.4\n@s modalString 8 1. 300. 0. 1. 0. 0. 2 3. 0.\n"
+      "@in1 frcInput [@bell clapper]\n@in2 frcInput [@s 0.25]\n@out1 posOutput [@bell left]\n"
+      "@out1 posOutput [@s 0.25]\n";
+  Player player(text, struck(1), {});
+  const Picture picture = make_picture(player.engine(), network_of(text), 1);
+  const auto drawing = nlohmann::json::parse(network_json(picture));
+  const auto& bodies = drawing["bodies"];
+  REQUIRE(bodies.size() == 2);
+  CHECK(bodies[0]["name"] == "bell");
+  CHECK(bodies[0]["strings"] == 0);
+  CHECK(bodies[0]["places"] == std::vector<std::string>{"clapper", "left", "right"});
+  CHECK(bodies[0]["modes"] == std::vector<std::vector<double>>{{1.0, 0.5, -0.5}, {0.2, -0.8, 0.4}});
+  CHECK(bodies[1]["strings"] == 2);
+  const std::vector<std::string> names = drawing["names"];
+  const auto place = std::find(names.begin(), names.end(), "s:0.25");
+  REQUIRE(place != names.end());
+  const auto at = static_cast<std::size_t>(place - names.begin());
+  CHECK(drawing["x"][at].get<double>() == drawing["wide"].get<double>() / 4.0);
+}
+
 TEST_CASE("viewing changes no bit of the sound and allocates nothing", "[panel]") {
   const std::string waveguides =
       "@s waveguide 1. 220. 3. 0.4 0.\n@t openWaveguide 0.5 110. 3. 0.6 0.\n"
