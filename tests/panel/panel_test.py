@@ -507,6 +507,13 @@ def falls(program, browser):
     # A bin of the spectrum is 23 Hz wide, a row of the picture 6 %.
     check(abs(math.log(hz / 200)) < 0.12, "the brightest row is at the pitch of the bell, 200 Hz")
     check(abs((first - then) * 10 - (end - begin)) < 0.1, "the picture moves at a tenth a second")
+    show = "document.querySelector('.sound').style.display = "
+    browser.evaluate(show + "'none'")
+    hidden, frames = browser.evaluate("[panel.spectrogram.time, panel.frames]")
+    browser.eventually(f"panel.frames > {frames} + 30")
+    check(browser.evaluate("panel.spectrogram.time") == hidden, "it rests while it is not seen")
+    browser.evaluate(show + "''")
+    check(browser.eventually(f"panel.spectrogram.time > {hidden} + 0.5"), "and goes on when it is")
 
 
 def learns(program, browser):
