@@ -10,6 +10,7 @@ namespace {
 
 constexpr std::uint32_t frames_after_touch =
     256;  // frames from a contact until a free block is tried again
+constexpr double most_surprise = 30.0;  // times the motion that is assumed at first
 constexpr std::uint32_t nowhere = 0xffffffffu;
 
 // Computes one block: divides it into parts with constant and with changing coefficients, decides
@@ -26,11 +27,18 @@ struct ModalPlayer {
   const std::size_t outputs = modes.outputs.size();
   const std::size_t inputs = program.inputs.size();
 
+  // Bounds on the motion of the modes in a part.
+  struct Motion {
+    T norm;            // of the modes that are not soft, at the start
+    T soft_speed = 0;  // sum over the soft modes, at the start
+    T kicks;           // growth of the norm
+  };
+
   // Plays the block in parts in which the coefficients change in every sample, or in none.
   void play() {
+    std::size_t moving = moving_frames();
     for (std::size_t at = 0; at < block.frames;) {
       const std::size_t left = block.frames - at;
-      const std::size_t moving = moving_frames();
       std::size_t frames = moving > 0 && moving < left ? moving : left;
       if (moving > 0) {
         wake();
@@ -40,6 +48,7 @@ struct ModalPlayer {
         hold_all();
         play_bound<true>(at, frames);
         s.motion.is_stale = true;
+        moving = moving_frames();
       } else if (s.sleep.silence > 0) {
         frames = frames < s.sleep.until_check || is_held() ? frames : s.sleep.until_check;
         play_steady(at, frames);
@@ -145,13 +154,28 @@ struct ModalPlayer {
 
   // --- sample by sample -----------------------------------------------------------------------
 
-  // Computes a part in which links act. Assumes that the links add to the norm of the modes at most
-  // this norm and twice what they added in the last block, and computes only the links that can
-  // act then. If they add more, the part is computed again with all links.
+  // Computes a part in which links act: first only those that can act if the links add to the norm
+  // of the modes at most this norm and twice what they added in the last block. After a strike they
+  // may add much more.
   void play_touched(std::size_t first, std::size_t frames) {
     const Motion motion = motion_in(first, frames);
     const T most = motion.norm + motion.soft_speed + motion.kicks + 2 * s.ends.kick_norm;
-    if (s.ends.has_bounds && s.held.surprised_frames == 0 && most > 0) {
+    const auto passed = static_cast<std::uint32_t>(frames);
+    const bool is_surprised = s.held.surprised_frames > 0;
+    s.held.surprised_frames -= passed < s.held.surprised_frames ? passed : s.held.surprised_frames;
+    if (!is_surprised && play_some(first, frames, motion, most)) {
+      return;
+    }
+    s.held.surprised_frames = is_surprised ? s.held.surprised_frames : frames_after_touch;
+    if (!play_some(first, frames, motion, T(most_surprise) * most)) {
+      hold_all();
+      play_bound<false>(first, frames);
+    }
+  }
+  // Computes only the links that can act if the links add at most this to the norm. Returns false,
+  // with the state as before, if they add more.
+  bool play_some(std::size_t first, std::size_t frames, const Motion& motion, T most) {
+    if (s.ends.has_bounds && most > 0) {
       hold_some(first, frames, {.norm = motion.norm, .kicks = motion.kicks + most});
     } else {
       hold_all();
@@ -161,14 +185,11 @@ struct ModalPlayer {
       save();
     }
     play_bound<false>(first, frames);
-    const auto passed = static_cast<std::uint32_t>(frames);
-    s.held.surprised_frames -= passed < s.held.surprised_frames ? passed : s.held.surprised_frames;
-    if (!is_whole && !(s.ends.kick_norm <= most)) {
-      s.held.surprised_frames = frames_after_touch;
-      restore();
-      hold_all();
-      play_bound<false>(first, frames);
+    if (is_whole || s.ends.kick_norm <= most) {
+      return true;
     }
+    restore();
+    return false;
   }
   template <bool Moving>
   void play_bound(std::size_t first, std::size_t frames) {
@@ -184,7 +205,11 @@ struct ModalPlayer {
     if (moves_by_shares && modes.is_exact) {
       leap_shares(frames);
     }
-    for (std::size_t n = first; n < first + frames; ++n) {
+    const bool is_lone = s.passive.shoves_later && s.passive.pulls && s.passive.active->alone == 1;
+    if (is_lone) {
+      acts = play_lone(first, frames);
+    }
+    for (std::size_t n = first; !is_lone && n < first + frames; ++n) {
       if constexpr (Moving) {
         if (moves_by_shares && modes.is_exact) {
           advance_exact();
@@ -219,6 +244,112 @@ struct ModalPlayer {
     s.held.touched_frames = acts                             ? frames_after_touch
                             : s.held.touched_frames > passed ? s.held.touched_frames - passed
                                                              : 0;
+  }
+
+  // One end of a link that acts alone.
+  struct LoneEnd {
+    std::uint32_t end;
+    bool is_place;
+    T x;
+    T v;
+    T give;                    // displacement by a unit force of the link
+    T kick = 0;                // displacement of the modes along its row in the last sample
+    T kicked = 0;              // sum of their magnitudes
+    const T* speed = nullptr;  // by the sweep
+  };
+  LoneEnd lone_end(std::uint32_t end, std::uint32_t link) const {
+    LoneEnd lone{.end = end, .is_place = end < places, .x = s.ends.x[end], .v = s.ends.v[end]};
+    if (lone.is_place) {
+      lone.give = inverse_mass() * s.passive.reply[end * s.passive.count + link];
+      lone.speed = s.sweep.speed + s.held.row_of[end];
+    }
+    return lone;
+  }
+  void move_lone(LoneEnd& lone, std::size_t n) const {
+    if (lone.is_place) {
+      lone.v = *lone.speed;
+      lone.x += lone.v;
+    } else if (const ModalEnd& end = modes.ends[lone.end - places]; end.follows) {
+      lone.x = block.value[n * inputs + end.input];
+      lone.v = block.velocity[n * inputs + end.input];
+    }
+  }
+  void push_lone(LoneEnd& lone, T force, T kick) const {
+    if (lone.is_place) {
+      lone.x -= lone.give * force;
+      lone.v -= lone.give * force;
+      lone.kick = kick;
+      lone.kicked += absolute(kick);
+      s.sweep.kick[s.held.row_of[lone.end]] = kick;
+    }
+  }
+  void keep_lone(const LoneEnd& lone) const {
+    s.ends.x[lone.end] = lone.x;
+    s.ends.v[lone.end] = lone.v;
+    if (lone.is_place) {
+      s.ends.force[lone.end] = 0;
+      s.ends.kicked[lone.end] += lone.kicked;
+      s.passive.shove[s.held.row_of[lone.end]] = lone.kick;
+    }
+  }
+
+  // Computes a part in which one passive link acts and nothing else pushes. Keeps the link in
+  // registers: its force, which the next sample waits for, takes as long as the sweep otherwise.
+  // Returns whether the link exerted a force.
+  bool play_lone(std::size_t first, std::size_t frames) {
+    const PassiveLink link = s.passive.active->links[0];
+    const std::uint32_t i = link.ends.a;
+    const T w = inverse_mass();
+    const T slack = s.passive.slack[i];
+    const ModalBody<T> body{s, w};
+    const std::size_t kicked = s.held.places;
+    const std::size_t heard = heard_along();
+    LoneEnd a = lone_end(s.passive.links[i].ends.a, i);
+    LoneEnd b = lone_end(s.passive.links[i].ends.b, i);
+    laws::LinkState<T> state{.gamma = body.gamma(link.ends)};
+    T yield = s.passive.yield[i];
+    T yield_step = s.passive.yield_step[i];
+    T force = 0;
+    bool acts = false;
+    std::fill_n(s.sweep.kick, kicked, T(0));
+    for (std::size_t n = first; n < first + frames; ++n) {
+      state.now = a.x - b.x + yield;
+      state.speed = a.v - b.v + yield_step;
+      sweep_sample<Crossed, true>(s, kicked, heard);
+      move_lone(a, n);
+      move_lone(b, n);
+      state.free = a.x - b.x;
+      state.fast = a.v - b.v - yield;
+      force = may_act(link, state, body) ? RESSORT_ISA::force_of(link, state, body) : T(0);
+      push_lone(a, force, -w * force);
+      push_lone(b, force, w * force);
+      yield_step = -yield - slack * force;
+      yield = -slack * force;
+      if (force != 0) {
+        acts = true;
+        if (s.sleep.awake < modes.modes) {
+          wake();
+          bundle<Crossed>(s, s.sweep.bundled);
+        }
+      }
+      for (std::size_t o = 0; o < outputs; ++o) {
+        const ModalOutput& output = modes.outputs[o];
+        const T moved =
+            o < heard ? s.sweep.heard[o] : read<Crossed>(s, s.shapes.outputs + o * s.shapes.row);
+        block.outputs[n * outputs + o] =
+            output.is_place ? static_cast<T>(output.place.rest) + moved -
+                                  w * s.passive.reply[(places + o) * s.passive.count + i] * force
+                            : position_of(output.end, n);
+      }
+    }
+    move_ends(first + frames - 1);
+    keep_lone(a);
+    keep_lone(b);
+    s.passive.yield[i] = yield;
+    s.passive.yield_step[i] = yield_step;
+    s.passive.pushed[i] = force;
+    s.passive.is_pushed = force != 0;
+    return acts;
   }
 
   void locate_places() {
@@ -577,11 +708,17 @@ struct ModalPlayer {
         seen = write_force(output.force, force++, seen, out, first, frames);
         continue;
       }
-      const T rest = static_cast<T>(output.place.rest);
-      for (std::size_t n = 0; n < frames; ++n, out += outputs) {
-        *out = output.is_place ? rest + seen[n] : position_of(output.end, first + n);
+      if (output.is_place) {
+        const T rest = static_cast<T>(output.place.rest);
+        for (std::size_t n = 0; n < frames; ++n) {
+          out[n * outputs] = rest + seen[n];
+        }
+        seen += max_block_frames;
+        continue;
       }
-      seen += output.is_place ? max_block_frames : 0;
+      for (std::size_t n = 0; n < frames; ++n) {
+        out[n * outputs] = position_of(output.end, first + n);
+      }
     }
   }
   // Writes a force while no link acts. Returns where the next output's row was seen.
@@ -638,12 +775,6 @@ struct ModalPlayer {
     }
   }
 
-  // Bounds on the motion of the modes in a part.
-  struct Motion {
-    T norm;            // of the modes that are not soft, at the start
-    T soft_speed = 0;  // sum over the soft modes, at the start
-    T kicks;           // growth of the norm
-  };
   // Returns these bounds without the forces of links.
   Motion motion_in(std::size_t first, std::size_t frames) {
     Motion motion{

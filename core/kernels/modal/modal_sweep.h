@@ -132,27 +132,37 @@ void sweep(ModalState<T>& s) {
   const V* const k = packs(s.motion.k);
   const V* const z = packs(s.motion.z);
   const V* row = packs(s.sweep.bundle);
+  // One sum at a time would be slower than its additions are: each waits for the one before.
+  constexpr std::size_t sums = Samples == 1 && Kicked + Heard <= 3 ? 2 : 1;
   V kick[Samples * Kicked + 1];
-  V speed[Kicked + 1];
-  V heard[Samples * Heard + 1];
+  V speed[sums][Kicked + 1];
+  V heard[sums][Samples * Heard + 1];
 #pragma GCC unroll 16
   for (std::size_t r = 0; r < Samples * Kicked; ++r) {
     kick[r] = V{} + s.sweep.kick[r];
   }
+#pragma GCC unroll 2
+  for (std::size_t sum = 0; sum < sums; ++sum) {
 #pragma GCC unroll 16
-  for (std::size_t r = 0; r < Kicked; ++r) {
-    speed[r] = V{};
-  }
+    for (std::size_t r = 0; r < Kicked; ++r) {
+      speed[sum][r] = V{};
+    }
 #pragma GCC unroll 16
-  for (std::size_t r = 0; r < Samples * Heard; ++r) {
-    heard[r] = V{};
+    for (std::size_t r = 0; r < Samples * Heard; ++r) {
+      heard[sum][r] = V{};
+    }
   }
   const std::size_t count = pack_count(s);
-  for (std::size_t i = 0; i < count; ++i) {
+  const auto advance = [&](std::size_t i, std::size_t sum_of) __attribute__((always_inline)) {
     V qi = q[i];
     V di = d[i];
     const V ki = k[i];
     const V zi = z[i];
+    V kicked[Kicked + 1];
+#pragma GCC unroll 16
+    for (std::size_t r = 0; r < Kicked && !Crossed; ++r) {
+      kicked[r] = row[r];
+    }
 #pragma GCC unroll 16
     for (std::size_t n = 0; n < Samples; ++n) {
       // Two sums of the kicks, to hide their latency: q and d depend on each other. Crossed modes
@@ -164,7 +174,7 @@ void sweep(ModalState<T>& s) {
           f[0] += kick[n * Kicked + r] * row[width * r];
           f[1] += kick[n * Kicked + r] * row[width * r + 1];
         } else {
-          f[r % 2] += kick[n * Kicked + r] * row[r];
+          f[r % 2] += kick[n * Kicked + r] * kicked[r];
         }
       }
       if constexpr (Crossed) {
@@ -192,30 +202,36 @@ void sweep(ModalState<T>& s) {
 #pragma GCC unroll 16
       for (std::size_t r = 0; r < Kicked && Felt; ++r) {
         if constexpr (Crossed) {
-          speed[r] += row[width * r] * f[0] - row[width * r + 1] * f[1];
+          speed[sum_of][r] += row[width * r] * f[0] - row[width * r + 1] * f[1];
         } else {
-          speed[r] += row[r] * di;
+          speed[sum_of][r] += kicked[r] * di;
         }
       }
 #pragma GCC unroll 16
       for (std::size_t r = 0; r < Heard; ++r) {
-        heard[n * Heard + r] += row[width * (Kicked + r)] * qi;
+        heard[sum_of][n * Heard + r] += row[width * (Kicked + r)] * qi;
         if constexpr (Crossed) {
-          heard[n * Heard + r] -= row[width * (Kicked + r) + 1] * di;
+          heard[sum_of][n * Heard + r] -= row[width * (Kicked + r) + 1] * di;
         }
       }
     }
     q[i] = qi;
     d[i] = di;
     row += width * (Kicked + Heard);
+  };
+  for (std::size_t i = 0; i < count; i += sums) {
+#pragma GCC unroll 2
+    for (std::size_t sum = 0; sum < sums; ++sum) {
+      advance(i + sum, sum);
+    }
   }
 #pragma GCC unroll 16
   for (std::size_t r = 0; r < Kicked && Felt; ++r) {
-    s.sweep.speed[r] = total<T>(speed[r]);
+    s.sweep.speed[r] = total<T>(sums == 1 ? speed[0][r] : speed[0][r] + speed[sums - 1][r]);
   }
 #pragma GCC unroll 16
   for (std::size_t r = 0; r < Samples * Heard; ++r) {
-    s.sweep.heard[r] = total<T>(heard[r]);
+    s.sweep.heard[r] = total<T>(sums == 1 ? heard[0][r] : heard[0][r] + heard[sums - 1][r]);
   }
 }
 

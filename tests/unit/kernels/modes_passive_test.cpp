@@ -38,6 +38,26 @@ TEST_CASE("Passive links act on modes as on masses", "[modes_passive]") {
   }
 }
 
+TEST_CASE("A passive link alone acts on modes as on masses", "[modes_passive]") {
+  // The other end is a moving input. Two fingers touch in turn.
+  for (const std::string links : {
+           "@in1 posInput 0.\n@b nlBow @in1 @s_m15 0.02 0.01\n",
+           "@in1 posInput 0.\n@p nlPluck @in1 @s_m15 0.02 0.05\n",
+           "@in1 posInput 0.\n@p nlPluck @in1 @s_m15 0.02 0.05\n"
+           "@in2 posInput 0.1\n@t contact @s_m4 @in2 0.1 0.01 0.\n",
+       }) {
+    CAPTURE(links);
+    const Program program =
+        in_modes(scenes::string("s", 30, "0.1", "0.005") + links + scenes::output(1, "s_m4") +
+                     scenes::output(2, "s_m17") + scenes::output(3, "s_m29"),
+                 Passivity::always);
+    REQUIRE(!is_plain(program));
+    for (const Isa isa : isas()) {
+      check_same<double>(program, {.frames = 8820, .highest_hz = 30.0, .isa = isa}, 1e-9);
+    }
+  }
+}
+
 // Fingers of two places each on a mesh, as pure dampers or with the given stiffness, in contact for
 // most of the time.
 std::string held_mesh(double k, double z) {
