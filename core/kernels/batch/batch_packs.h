@@ -55,6 +55,7 @@ struct Packs {
   // Returns a subrange.
   Packs some(std::size_t first, std::size_t so_many) const {
     Packs packs = *this;
+    packs.first += first;
     packs.count = so_many;
     packs.cells += first * stride;
     packs.slots += first * stride;
@@ -62,6 +63,7 @@ struct Packs {
   }
 
   std::size_t all;
+  std::size_t first = 0;  // Number of the first of these packs in each row.
   std::size_t count;
   std::size_t stride;
   V* cells;
@@ -78,6 +80,7 @@ struct Rows {
         velocity(block.velocity),
         outputs(reinterpret_cast<V*>(block.outputs)),
         is_common(block.is_common),
+        is_still(block.is_still),
         input(is_common ? 1 : table.packs * lanes_of<V>),
         in(program.inputs.size() * input),
         out(program.outputs.size() * table.packs) {}
@@ -103,6 +106,7 @@ struct Rows {
   const T* velocity;
   V* outputs;
   bool is_common;
+  bool is_still;  // All samples of the inputs are the same.
   std::size_t input;  // Numbers per sample of an input and an output.
   std::size_t in;
   std::size_t out;

@@ -71,16 +71,50 @@ class PassiveLinks {
     }
   }
 
+  // Returns whether may_act() can be false: in no lane is this the first sample, and all links have
+  // a zone.
+  bool may_rest() const {
+    bool are_awake = true;
+    for (std::size_t pack = 0; pack < packs_.count; ++pack) {
+      are_awake &= !any_of(body(pack).is_awake <= V{});
+    }
+    const std::vector<PassiveLink>& links = state_.passive.links;
+    return are_awake && std::all_of(links.begin(), links.end(), [](const PassiveLink& link) {
+             return link.zone == Zone::near || link.zone == Zone::below;
+           });
+  }
+  // Returns whether any link can act in this sample, after masses and inputs have moved. Otherwise
+  // stores the distances for the next sample.
+  [[gnu::always_inline]] bool may_act() const {
+    const std::vector<PassiveLink>& links = state_.passive.links;
+    bool acts = false;
+    for (std::size_t pack = 0; pack < packs_.count; ++pack) {
+      const Passive<V> own = body(pack);
+      V* row = memory(pack);
+      for (const PassiveLink& link : links) {
+        const laws::LinkState<V> state{
+            .now = row[0], .speed = row[1], .free = own.distance(link.ends)};
+        acts |= RESSORT_ISA::may_act(link, state, own);
+        row[0] = state.free;
+        row[1] = own.speed(link.ends);
+        row += passive_rows;
+      }
+    }
+    return acts;
+  }
+
  private:
   Passive<V> body(std::size_t pack) const {
-    return {.nodes = packs_.nodes(pack),
-            .all = {reinterpret_cast<const V*>(state_.ramps.value) + pack, packs_.all},
-            .inverse_mass = state_.inverse_mass,
-            .masses = program_.moving,
-            .is_awake = reinterpret_cast<const V*>(state_.awake)[pack]};
+    return {
+        .nodes = packs_.nodes(pack),
+        .all = {reinterpret_cast<const V*>(state_.ramps.value) + packs_.first + pack, packs_.all},
+        .inverse_mass = state_.inverse_mass,
+        .masses = program_.moving,
+        .is_awake = reinterpret_cast<const V*>(state_.awake)[packs_.first + pack]};
   }
   V* memory(std::size_t pack) const {
-    return reinterpret_cast<V*>(state_.memory) + pack * passive_rows * state_.passive.links.size();
+    return reinterpret_cast<V*>(state_.memory) +
+           (packs_.first + pack) * passive_rows * state_.passive.links.size();
   }
 
   [[gnu::noinline]] void remember_all() const {
@@ -92,7 +126,7 @@ class PassiveLinks {
     for (std::size_t pack = 0; pack < packs_.count; ++pack) {
       Passive<V> own = body(pack);
       RESSORT_ISA::correct(state_.passive, memory(pack), reinterpret_cast<V*>(state_.solver), own);
-      reinterpret_cast<V*>(state_.awake)[pack] = V{} + 1;
+      reinterpret_cast<V*>(state_.awake)[packs_.first + pack] = V{} + 1;
     }
   }
 
@@ -129,6 +163,8 @@ template <class V>
 // prefetcher does not predict.
 constexpr std::size_t rows_ahead = 12;
 
+constexpr std::size_t most_restored = 8;  // Nodes of a pack that a block may put back.
+
 struct SpringsAlone {};  // Stands for: no other links.
 template <Law law>
 using TypeOf = std::tuple_element_t<static_cast<std::size_t>(law), Laws>;
@@ -159,12 +195,15 @@ class Holder {
   }
 
   // Steps P packs for all `frames` samples without leaving the registers. The masses are joined by
-  // springs, and have either links of one type or one force input each.
-  template <std::uint32_t P, class Type>
-  [[gnu::always_inline]] void stay(Rows<V> rows, std::size_t frames) const {
+  // springs, and have either links of one type or one force input each. Returns false, with the
+  // state as before, if a passive link may act.
+  template <std::uint32_t P, class Type, class Passives>
+  [[gnu::always_inline]] bool stay(Rows<V> rows, std::size_t frames,
+                                   const Passives* passive) const {
     V x[P][N];
     V v[P][N];
     V f[P][N];
+    Node<V> before[P][most_restored];
     each<P>([&](auto p) {
       each<N>([&](auto i) {
         x[p][i] = packs_.nodes(p)[i].x;
@@ -172,6 +211,10 @@ class Holder {
         f[p][i] = packs_.nodes(p)[i].force;
       });
     });
+    if (passive != nullptr) {
+      each<P>([&](auto p) { std::copy_n(packs_.nodes(p), table_.nodes, before[p]); });
+      passive->remember();
+    }
     const std::uint32_t anchored = table_.anchored;
     const std::uint32_t linked = table_.linked;
     const std::uint32_t pushed = table_.pushed;
@@ -190,7 +233,16 @@ class Holder {
           f[p][i] = V{};
         });
       });
-      take_positions(program_, packs_, rows);
+      if (!rows.is_still || frame == 0) {
+        take_positions(program_, packs_, rows);
+      }
+      if (passive != nullptr) {
+        each<P>([&](auto p) { each<N>([&](auto i) { packs_.nodes(p)[i].v = v[p][i]; }); });
+        if (passive->may_act()) {
+          each<P>([&](auto p) { std::copy_n(before[p], table_.nodes, packs_.nodes(p)); });
+          return false;
+        }
+      }
       give_positions(program_, packs_, rows.outputs);
       rows.advance();
       each<P>([&](auto p) {
@@ -207,6 +259,7 @@ class Holder {
         packs_.nodes(p)[i].force = f[p][i];
       });
     });
+    return true;
   }
 
  private:
@@ -333,26 +386,56 @@ class Holder {
   std::size_t pusher_[N];
 };
 
-// Two packs hide each other's latency, and their data fits into 32 registers.
+// Steps a sample of all packs after the other.
+template <class V, std::uint32_t N, bool is_alike, class Passives>
+void take_turns(const Holder<V, N, is_alike>& holder, const Program& program, const Packs<V>& packs,
+                const Passives& passive, Rows<V> rows, std::size_t frames) {
+  passive.remember();
+  holder.move(rows);
+  for (std::size_t frame = 0;;) {
+    take_positions(program, packs, rows);
+    passive.correct();
+    give_positions(program, packs, rows.outputs);
+    rows.advance();
+    if (++frame == frames) {
+      break;
+    }
+    passive.remember();
+    holder.exert_and_move(rows);
+  }
+  holder.exert(rows);
+}
+
+// Steps some packs in registers for as long as no passive link may act. Two packs hide each
+// other's latency; three fit into 32 registers.
 template <class V, std::uint32_t N, bool is_alike, class Type>
 void hold_in_registers(const Program& program, const Batch& batch, const BatchTable& table,
-                       const Packs<V>& packs, const Rows<V>& rows, std::size_t frames) {
+                       BatchState<Scalar<V>>& state, const Packs<V>& packs, const Rows<V>& rows,
+                       std::size_t frames) {
   constexpr bool has_links = !std::is_same_v<Type, SpringsAlone>;
   const auto stay = [&]<std::uint32_t P>(std::size_t first) {
     const Packs<V> some = packs.some(first, P);
-    Holder<V, N, is_alike>(program, batch, table, some)
-        .template stay<P, Type>(rows.from(first), frames);
+    const PassiveLinks passive(program, some, state);
+    const Holder<V, N, is_alike> holder(program, batch, table, some);
+    const bool has_passive = !state.passive.links.empty();
+    if ((has_passive && !passive.may_rest()) ||
+        !holder.template stay<P, Type>(rows.from(first), frames,
+                                       has_passive ? &passive : nullptr)) {
+      take_turns(holder, program, some, passive, rows.from(first), frames);
+    }
   };
+  constexpr bool has_three = !has_links && sizeof(V) == 64;
   const std::size_t left = packs.count % 2;
-  const std::size_t pairs = packs.count - (left == 0 || packs.count < 3 || has_links ? left : 3);
+  const std::size_t pairs = packs.count - (left == 1 && packs.count >= 3 && has_three ? 3 : left);
   for (std::size_t first = 0; first < pairs; first += 2) {
     stay.template operator()<2>(first);
   }
-  if (pairs + 3 == packs.count) {
-    if constexpr (!has_links) {
-      stay.template operator()<3>(pairs);
+  if constexpr (has_three) {
+    if (pairs + 3 == packs.count) {
+      return stay.template operator()<3>(pairs);
     }
-  } else if (left == 1) {
+  }
+  if (left == 1) {
     stay.template operator()<1>(pairs);
   }
 }
@@ -361,18 +444,24 @@ void hold_in_registers(const Program& program, const Batch& batch, const BatchTa
 // did.
 template <class V, std::uint32_t N, bool is_alike>
 bool could_hold_in_registers(const Program& program, const Batch& batch, const BatchTable& table,
-                             const Packs<V>& packs, const Rows<V>& rows, std::size_t frames) {
+                             BatchState<Scalar<V>>& state, const Packs<V>& packs,
+                             const Rows<V>& rows, std::size_t frames) {
   const auto hold = [&]<class Type>(Type) {
-    hold_in_registers<V, N, is_alike, Type>(program, batch, table, packs, rows, frames);
+    hold_in_registers<V, N, is_alike, Type>(program, batch, table, state, packs, rows, frames);
     return true;
   };
-  const auto is_all = [&](Law law) {
-    return std::all_of(table.laws.begin(), table.laws.end(), [=](Law l) { return l == law; });
-  };
+  if ((table.touched & table.pushed) != 0 || table.is_pulled ||
+      (!state.passive.links.empty() && table.nodes > most_restored)) {
+    return false;
+  }
   if (table.laws.empty()) {
     return hold(SpringsAlone{});
   }
-  if constexpr (is_alike) {
+  if constexpr (is_alike && sizeof(V) == 64) {
+    const auto is_all = [&](Law law) {
+      return state.passive.links.empty() &&
+             std::all_of(table.laws.begin(), table.laws.end(), [=](Law l) { return l == law; });
+    };
     if (is_all(Law::pluck)) {
       return hold(TypeOf<Law::pluck>{});
     }
@@ -391,32 +480,15 @@ void hold(const Program& program, const Batch& batch, const BatchTable& table,
   const PassiveLinks passive(program, packs, state);
   Rows<V> rows(program, table, block);
   const auto* audio = block.audio;
-  for (std::size_t frame = 0; frame < block.frames;) {
+  for (std::size_t frame = 0; frame < block.frames; rows.advance()) {
     const bool moves = move_coefficients(program, state.ramps, audio);
     fill_slots(table, reinterpret_cast<const V*>(state.ramps.value), packs);
-    const std::size_t end = moves ? frame + 1 : block.frames;
-    if constexpr (sizeof(V) == 64) {
-      if (!moves && (table.touched & table.pushed) == 0 && !table.is_pulled &&
-          state.passive.links.empty() &&
-          could_hold_in_registers<V, N, is_alike>(program, batch, table, packs, rows,
-                                                  end - frame)) {
-        return;
-      }
+    const std::size_t frames = moves ? 1 : block.frames - frame;
+    if (moves || !could_hold_in_registers<V, N, is_alike>(program, batch, table, state, packs, rows,
+                                                          frames)) {
+      take_turns(holder, program, packs, passive, rows, frames);
     }
-    passive.remember();
-    holder.move(rows);
-    for (;;) {
-      take_positions(program, packs, rows);
-      passive.correct();
-      give_positions(program, packs, rows.outputs);
-      rows.advance();
-      if (++frame == end) {
-        break;
-      }
-      passive.remember();
-      holder.exert_and_move(rows);
-    }
-    holder.exert(rows);
+    frame += frames;
   }
 }
 

@@ -321,6 +321,25 @@ TEST_CASE("hard contacts are passive in every voice", "[batch]") {
   }
 }
 
+TEST_CASE("a passive pick that comes and goes acts on masses in registers", "[batch]") {
+  // It touches for a tenth of the time. The other blocks do not leave the registers.
+  Program program = program_of(example("IPlayTheTriangle"), Passivity::always);
+  auto form = batch_form(program);
+  REQUIRE((form && !is_plain(program)));
+  program.form = std::move(*form);
+  for (const Isa isa : isas()) {
+    for (const std::size_t voices : {1, 5, 13}) {
+      CAPTURE(isa_name(isa), voices);
+      for (const Comparison& voice : compare_voices<double>(
+               program, {.voices = voices, .frames = 6000, .reach = 0.06, .isa = isa})) {
+        CAPTURE(show(voice.relative()));
+        CHECK(voice.peak > 1e-3);
+        CHECK(voice.relative() < 1e-11);
+      }
+    }
+  }
+}
+
 TEST_CASE("a reset of one lane does not affect the others", "[batch]") {
   const Program program = formed(example("PolyTriangle"));
   ManyVoices<double> choir(program, 16, best_isa());
