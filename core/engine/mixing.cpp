@@ -178,7 +178,7 @@ void Mixing::add_frozen(const Program& program, const VoiceGroup& group, const S
 void Mixing::make_noise(const Segment& segment) {
   for (std::size_t n = segment.at; n < segment.end(); ++n) {
     for (double* const output : segment.outputs) {
-      output[n] *= white_sample(noise_);
+      output[n] *= 0x1p-63 * static_cast<double>(static_cast<std::int64_t>(splitmix64(noise_)));
     }
   }
 }

@@ -75,8 +75,11 @@ void OutputLevels::apply(Bank<T>& bank, const VoiceGroup& group, std::size_t fra
       continue;
     }
     T* row = bank.outputs.data() + level.output * part.width;
+    T factor = static_cast<T>(level.target);
     for (std::size_t n = 0; n < frames; ++n, row += part.row()) {
-      const T factor = static_cast<T>(level.frames == 0 ? level.target : level.after(n + 1));
+      if (level.frames > 0) {
+        factor = static_cast<T>(level.after(n + 1));
+      }
       for (std::size_t lane = 0; lane < part.width; ++lane) {
         row[lane] *= factor;
       }

@@ -155,9 +155,12 @@ template <class S, std::size_t packs, class T>
   const std::size_t inputs = program.inputs.size();
   const std::size_t output_count = program.outputs.size();
   const std::size_t frames = block.frames;
-  const bool has_sites = sites->pack != nowhere;
+  const bool has_forces = std::any_of(s.forces.first, s.forces.last, [&](const PlacedInput& input) {
+    return !block.is_still || value[input.index] != 0;
+  });
   const bool has_others = s.loose_runs.first != s.loose_runs.last ||
-                          s.link_runs.first != s.link_runs.last || s.forces.first != s.forces.last;
+                          s.link_runs.first != s.link_runs.last || has_forces;
+  const bool has_sites = sites->pack != nowhere && has_others;
   // The first empty place after the last mass repeats the node that holds the end.
   if (tables.short_end != nowhere) {
     s.bodies[tables.short_end] = s.bodies[chain.right];
