@@ -29,6 +29,7 @@ struct BenchScene {
   std::string tuned_by = "";  // the parameter that sets a voice's pitch in FAUST
   std::string family = "";    // its curve in the picture; empty: none
   std::size_t elements = 0;   // approximate number of masses and links
+  bool is_noisy = false;      // the outputs multiply white noise
   bool is_worst = false;  // all contacts are closed all the time, the case that the planner assumes
 };
 

@@ -200,6 +200,15 @@ std::string exported(const Network& peer) {
   return text ? *text : std::string();
 }
 
+// Returns the program with its outputs multiplied by white noise.
+std::string noisy(std::string text) {
+  const std::string word = "process";
+  text.replace(text.rfind("\n" + word) + 1, word.size(), "model_without_noise");
+  return "import(\"stdfaust.lib\");\n" + text +
+         "process = model_without_noise :\n"
+         "  par(i, outputs(model_without_noise), *(no.noises(outputs(model_without_noise), i)));\n";
+}
+
 // Returns a name that depends on the text only, so that scenes can share a program.
 fs::path base_of(const fs::path& folder, const std::string& text) {
   char name[40];
@@ -219,7 +228,8 @@ std::vector<FaustLibrary> faust_libraries(const BenchScene& scene, const Network
   }
   fs::create_directories(folder);
   std::vector<Job> jobs;
-  const auto add = [&](const std::string& text, const char* prefix, bool is_export) {
+  const auto add = [&](std::string text, const char* prefix, bool is_export) {
+    text = scene.is_noisy ? noisy(std::move(text)) : std::move(text);
     const fs::path base = base_of(folder, text);
     std::ofstream(base.string() + ".dsp") << text;
     for (const Option& option : options) {

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <ctime>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 
@@ -98,36 +100,51 @@ class FaustVoices {
   std::vector<double*> output_pointers_;
 };
 
-// Returns the least share of a core that FAUST's code of the preset's model takes in double
-// precision, of all options and compilers; nothing if there is none.
-std::optional<double> faust_share(const Player& player, int voices, int turns) {
-  const Network& network = player.scene().network;
-  const bench::BenchScene scene{.text = print_network(network)};
-  std::optional<double> best;
-  for (const bench::FaustLibrary& library : bench::faust_libraries(
-           scene, network, std::filesystem::temp_directory_path() / "ressort-faust")) {
-    std::vector<double> shares;
-    for (int turn = 0; turn < turns && library.is_double; ++turn) {
-      shares.push_back(FaustVoices(library, voices, network.inputs.size()).processor_share());
-    }
-    if (!shares.empty()) {
-      best = std::min(best.value_or(1e9), median(shares));
+// FAUST's code of a preset's model in double precision, with all options and compilers.
+class FaustPeers {
+ public:
+  explicit FaustPeers(const Player& player)
+      : voices_(player.instrument().voices), inputs_(player.scene().network.inputs.size()) {
+    const Network& network = player.scene().network;
+    libraries_ = bench::faust_libraries(
+        {.text = print_network(network), .is_noisy = player.scene().preset.noise}, network,
+        std::filesystem::temp_directory_path() / "ressort-faust");
+    std::erase_if(libraries_, [](const auto& library) { return !library.is_double; });
+    shares_.resize(libraries_.size());
+  }
+  void measure() {
+    for (std::size_t i = 0; i < libraries_.size(); ++i) {
+      shares_[i].push_back(FaustVoices(libraries_[i], voices_, inputs_).processor_share());
     }
   }
-  return best;
-}
+  // Returns the median of the fastest one; infinity if there is none.
+  double best_share() const {
+    double best = std::numeric_limits<double>::infinity();
+    for (const std::vector<double>& shares : shares_) {
+      best = std::min(best, median(shares));
+    }
+    return best;
+  }
+
+ private:
+  int voices_;
+  std::size_t inputs_;
+  std::vector<bench::FaustLibrary> libraries_;
+  std::vector<std::vector<double>> shares_;  // [library][turn]
+};
 
 }  // namespace
 
 int print_played(const std::vector<std::string>& names, int turns) {
   std::printf(
       "| %% of a core | voices | idle | one | all | re-struck | low keys | high keys "
-      "| FAUST, all |\n"
-      "| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n");
+      "| float, all | predicted | FAUST, all |\n"
+      "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n");
   int failures = 0;
   for (const std::string& name : names) {
     try {
       Player player(name, played_rate_hz);
+      Player in_float(name, played_rate_hz, true, Precision::float32);
       const int voices = player.instrument().voices;
       const std::vector<TimedEvent> all = chord(voices);
       const std::array<std::vector<TimedEvent>, 6> played = {
@@ -137,21 +154,27 @@ int print_played(const std::vector<std::string>& names, int turns) {
            restruck(all),
            chord(voices, 28, 1),
            chord(voices, std::max(28, 97 - voices), 1)}};
-      std::array<std::vector<double>, played.size()> shares;
+      std::array<std::vector<double>, played.size() + 1> shares;
+      std::optional<FaustPeers> faust;
+      if (std::find(published.begin(), published.end(), name) != published.end()) {
+        faust.emplace(player);
+      }
       for (int turn = 0; turn < turns; ++turn) {
         for (std::size_t i = 0; i < played.size(); ++i) {
           shares[i].push_back(player.processor_share(played[i], played_s));
+        }
+        shares.back().push_back(in_float.processor_share(all, played_s));
+        if (faust) {
+          faust->measure();
         }
       }
       std::printf("| %s | %d ", name.c_str(), voices);
       for (const std::vector<double>& share : shares) {
         std::printf("| %.2f ", 100.0 * median(share));
       }
-      const bool is_published =
-          std::find(published.begin(), published.end(), name) != published.end();
-      const std::optional<double> faust =
-          is_published ? faust_share(player, voices, turns) : std::nullopt;
-      faust ? std::printf("| %.2f |\n", 100.0 * *faust) : std::printf("| |\n");
+      std::printf("| %.2f ", 100.0 * player.predicted_share());
+      const double best = faust ? faust->best_share() : std::numeric_limits<double>::infinity();
+      std::isfinite(best) ? std::printf("| %.2f |\n", 100.0 * best) : std::printf("| |\n");
       std::fflush(stdout);
     } catch (const std::runtime_error& error) {
       std::fprintf(stderr, "%s\n", error.what());

@@ -22,9 +22,9 @@ Scene scene_of(const std::string& name, bool with_lfos) {
   return *std::move(scene);
 }
 
-Compiled compiled_of(const Scene& scene, double rate_hz) {
+Compiled compiled_of(const Scene& scene, double rate_hz, Precision precision) {
   std::vector<std::string> warnings;
-  auto compiled = compile_scene(scene, {.rate_hz = rate_hz}, warnings);
+  auto compiled = compile_scene(scene, {.rate_hz = rate_hz, .precision = precision}, warnings);
   if (!compiled) {
     throw std::runtime_error(compiled.error().message);
   }
@@ -65,9 +65,9 @@ std::vector<TimedEvent> chord(int voices) {
   return voices <= 16 ? chord(voices, 48, 2) : chord(voices, 28, 1);
 }
 
-Player::Player(const std::string& name, double rate_hz, bool with_lfos)
+Player::Player(const std::string& name, double rate_hz, bool with_lfos, Precision precision)
     : scene_(scene_of(name, with_lfos)),
-      compiled_(compiled_of(scene_, rate_hz)),
+      compiled_(compiled_of(scene_, rate_hz, precision)),
       rate_hz_(rate_hz),
       blocker_(rate_hz) {}
 
@@ -137,6 +137,14 @@ void Player::run(const std::vector<TimedEvent>& events, double seconds, Stereo* 
       }
     }
   }
+}
+
+double Player::predicted_share() const {
+  double ns = 0.0;
+  for (const Part& part : compiled_.plan.parts) {
+    ns += part.ns();
+  }
+  return 1e-9 * ns * rate_hz_;
 }
 
 double Player::real_time_share(double seconds, int voices) {

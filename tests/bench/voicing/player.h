@@ -32,7 +32,8 @@ std::vector<TimedEvent> chord(int voices);
 class Player {
  public:
   // Throws std::runtime_error with all errors. Without LFOs, a bow plays without vibrato.
-  Player(const std::string& name, double rate_hz, bool with_lfos = true);
+  Player(const std::string& name, double rate_hz, bool with_lfos = true,
+         Precision precision = Precision::float64);
 
   // Plays from silence, with the parameters of the preset and without input signals. The events are
   // sorted by time.
@@ -43,6 +44,9 @@ class Player {
   // Returns the least such share of a number of voices, each with a note, and the bodies in the
   // first seconds of these notes.
   double real_time_share(double seconds, int voices);
+
+  // Returns the share that the plan predicts for all voices, with all contacts closed.
+  double predicted_share() const;
 
   const Scene& scene() const { return scene_; }
   const Instrument& instrument() const { return compiled_.instrument; }
