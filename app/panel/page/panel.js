@@ -247,7 +247,8 @@ function makeSlider(info) {
   const limits = [lowest > 0 ? 'above ' + digits(lowest) : '', highest !== null ? 'below ' + digits(highest) : ''].filter(Boolean).join(' and ');
   row.append(make('label', name, { for: id }), output, track,
     make('small', info.audio_input > 0 ? `given by audio input ${info.audio_input}` : limits ? 'proved stable ' + limits : 'stable anywhere', { id: id + '-range' }));
-  if (!info.audio_input) row.append(makeDesk(name, name));
+  // A control of the same name takes the controllers.
+  if (!info.audio_input && !knobs.has('/control/' + name)) row.append(makeDesk(name, name));
   const show = value => {
     if (document.activeElement === input && input.matches(':active')) return;
     input.value = to(value);
