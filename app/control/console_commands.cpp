@@ -249,7 +249,13 @@ Result<Done> command::control(ConsoleContext& console, Words words) {
   if (!current) {
     return nothing_loaded;
   }
-  const std::string wanted = words.empty() ? "*" : model::word_of(words[0]);
+  const auto& knobs = current->instrument.knobs;
+  const auto meant = std::ranges::find_if(knobs, [&](const KnobInfo& knob) {
+    return !words.empty() && same_but_case(knob.word, words[0]);
+  });
+  const std::string wanted = words.empty()          ? "*"
+                             : meant != knobs.end() ? meant->word
+                                                    : model::word_of(words[0]);
   if (words.size() == 2) {
     const auto events = play(console, {"/control/" + wanted, {to_argument(words[1])}});
     return events ? Result<Done>(Done{}) : events.error();
@@ -444,6 +450,14 @@ std::vector<std::vector<std::string>> control_rows(const ConsoleContext& console
                                                 control.target) +
                                    ", " + range + (control.exponential ? ", exponential" : "") +
                                    keys + (turns ? now(control.target) : "")});
+  }
+  for (const KnobInfo& knob : current.instrument.knobs) {
+    if (knob.controller < 0) {
+      rows.push_back({knob.name, "control, " + print_number(knob.range.low) + " to " +
+                                     print_number(knob.range.high) +
+                                     (knob.range.exponential ? ", exponential" : "") +
+                                     now(knob.name)});
+    }
   }
   return rows;
 }

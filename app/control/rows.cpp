@@ -55,7 +55,12 @@ Events turn_knobs(const PlayCall& call) {
   std::vector<std::string> words;
   for (const KnobInfo& knob : call.instrument.knobs) {
     words.push_back(knob.word);
-    if (fits(call.name, knob.word)) {
+    if (fits(call.name, knob.word) && knob.controller < 0) {
+      events.push_back({.kind = EventKind::parameter,
+                        .index = static_cast<std::uint16_t>(*knob.parameter),
+                        .model = call.serial,
+                        .value = knob.range.value_at(call.arguments[0])});
+    } else if (fits(call.name, knob.word)) {
       events.push_back({.kind = EventKind::controller,
                         .channel = call.instrument.channel,
                         .index = static_cast<std::uint16_t>(knob.controller),
@@ -257,7 +262,7 @@ std::vector<Row> make_rows() {
        .act = command::set},
       {.address = "/control/NAME",
        .arguments = {{"VALUE", "the value", 0, 1}},
-       .does = "moves a named control of the preset, 0-1; without VALUE, replies with its position",
+       .does = "moves a named control, 0-1; without VALUE, replies with its position",
        .play = turn_knobs,
        .answer = answer::knobs,
        .command = "control",

@@ -170,7 +170,7 @@ MappedTarget CurrentScene::target_of(const std::string& name) const {
     return controller_target(number);
   }
   for (const KnobInfo& knob : instrument.knobs) {
-    if (knob.word == word_of(name)) {
+    if (knob.controller >= 0 && knob.word == word_of(name)) {
       return controller_target(knob.controller);
     }
   }
@@ -274,7 +274,9 @@ Result<Done> CurrentScene::learn(const std::string& target) {
   if (!found.exists || is_action(target) || controller_number(target) >= 0) {
     std::vector<std::string> known;
     for (const KnobInfo& knob : loaded_->instrument.knobs) {
-      known.push_back(knob.word);
+      if (knob.controller >= 0) {
+        known.push_back(knob.word);
+      }
     }
     for (const ParameterInfo& info : loaded_->instrument.parameters) {
       known.push_back(info.name);

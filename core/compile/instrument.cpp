@@ -8,6 +8,7 @@
 
 #include "core/compile/prove.h"
 #include "core/compile/tune.h"
+#include "core/curve.h"
 #include "core/model/preset/fit.h"
 #include "core/model/topology.h"
 
@@ -353,8 +354,9 @@ namespace {
 
 // Returns the named controllers. One that only scales an LFO has the LFO's name. Those with a usual
 // meaning come first, in the same order in all presets: brightness, ring, touch, the wheel and
-// space.
-std::vector<KnobInfo> find_knobs(const Network& network, const Preset& preset) {
+// space. Without any, each parameter is a control of its own name, over its range.
+std::vector<KnobInfo> find_knobs(const Network& network, const Preset& preset,
+                                 const std::vector<ParameterInfo>& parameters) {
   constexpr int usual[] = {74, 71, 16, 1, 91};
   std::vector<KnobInfo> knobs;
   for (const ControlSetting& named : preset.controls) {
@@ -394,6 +396,18 @@ std::vector<KnobInfo> find_knobs(const Network& network, const Preset& preset) {
                        .controller = lfo.number});
     }
   }
+  const bool has_names = !knobs.empty();
+  for (std::size_t i = 0; !has_names && i < parameters.size(); ++i) {
+    const ParameterInfo& info = parameters[i];
+    if (info.audio_input == 0) {
+      knobs.push_back({.name = info.name,
+                       .word = info.name,
+                       .help = "Parameter of the model",
+                       .controller = -1,
+                       .parameter = i,
+                       .range = {info.minimum, info.maximum, is_wide(info.minimum, info.maximum)}});
+    }
+  }
   std::ranges::stable_sort(knobs, {}, [&](const KnobInfo& knob) {
     return std::ranges::find(usual, knob.controller) - std::begin(usual);
   });
@@ -419,7 +433,7 @@ Instrument make_instrument(const Network& network, const Preset& preset, const P
   return {.parameters = proof.stability.parameters,
           .inputs = std::move(inputs),
           .custom = std::move(custom),
-          .knobs = find_knobs(network, preset),
+          .knobs = find_knobs(network, preset, proof.stability.parameters),
           .blow = find_blow(network, controls, mode ? mode->frequency_hz : 220.0, gain),
           .outputs = output_count(network),
           .audio_inputs = audio_input_count(network, preset),

@@ -42,7 +42,7 @@ struct KnobInfo {
   std::string name;  // "Bow pressure"
   std::string word;  // the same in addresses and commands: "bow-pressure"
   std::string help;  // one line; may be empty
-  int controller = 0;
+  int controller = 0;                    // -1: none, only messages move it
   std::optional<std::size_t> parameter;  // nothing: the knob moves inputs only
   KnobRange range;                       // of the parameter
   double rest = 0.0;                     // position of a knob without a parameter until it moves

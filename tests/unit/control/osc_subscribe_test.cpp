@@ -216,6 +216,44 @@ TEST_CASE("subscribers receive the positions of named controls", "[osc_subscribe
   CHECK(has(h.say("control"), "brightness  0.25\ntouch       0.12"));
 }
 
+TEST_CASE("a client learns a knob and forgets it", "[osc_subscribe]") {
+  OscHarness osc;
+  Harness& h = osc.harness;
+  Client client(osc.server->port());
+  CHECK(client.ask(message("/learn", {"M_k"})).address == "/done");
+  const TimedEvent turn{{.kind = EventKind::controller, .index = 21, .value = 1.0}};
+  REQUIRE(h.process.send(h.process.from_midi, {&turn, 1}));
+  h.play();
+  while (h.session.mapping().empty()) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  CHECK(h.session.mapping()[0].setting == ControllerSetting{{.number = 21}, "m_K"});
+  CHECK(client.ask(message("/unlearn", {"m_K"})).address == "/done");
+  CHECK(h.session.mapping().empty());
+  CHECK(client.ask(message("/unlearn", {"m_K"})).address == "/fail");
+  CHECK(client.ask(message("/unlearn")).address == "/done");
+  CHECK(client.ask(message("/learn", {"m_Q"})).address == "/fail");
+  CHECK(client.ask(message("/learn")).address == "/error");
+}
+
+// From 0.01 to 0.2 in equal ratios, 0.1 is at log(10) / log(20).
+TEST_CASE("without named controls, parameters are controls", "[osc_subscribe]") {
+  OscHarness osc;
+  Harness& h = osc.harness;
+  Client client(osc.server->port());
+  CHECK(value(client.ask(message("/control/m_K"))) ==
+        Approx(std::log(10.0) / std::log(20.0)).epsilon(1e-6));
+  CHECK(has(h.say("control"), "m_K"));
+  CHECK(has(h.say("explain"), "control, 0.01 to 0.2, exponential; now 0.1"));
+  h.say("control M_K 0");
+  h.play();
+  CHECK(*h.session.parameter("m_K") == 0.01);
+  client.send(message("/control/m_*", {1.0f}));
+  client.sync();
+  h.play();
+  CHECK(*h.session.parameter("m_K") == Approx(0.2).epsilon(1e-12));
+}
+
 TEST_CASE("a subscription ends with its lease", "[osc_subscribe]") {
   OscHarness osc;
   Client listener(osc.server->port());
