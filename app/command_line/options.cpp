@@ -1,5 +1,6 @@
 #include "app/command_line/options.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -129,6 +130,30 @@ void add_numbers(CLI::App& command, Precision& precision, bool& rescale) {
   add_no_rescale(command, rescale);
 }
 
+namespace {
+
+// Adds a word N or FROM=TO.
+void add_channel(KeyOptions& keys, const std::string& word) {
+  const std::size_t sign = std::min(word.find('='), word.size());
+  double from = 0.0;
+  double to = 0.0;
+  const auto is_channel = [](double number) {
+    return number >= 1.0 && number <= 16.0 && number == std::floor(number);
+  };
+  if (!parse_number(word.substr(0, sign), from) || !is_channel(from) ||
+      !parse_number(sign < word.size() ? word.substr(sign + 1) : word, to) || !is_channel(to)) {
+    throw CLI::ValidationError("--channel", "must be 1 to 16, or FROM=TO, found " + word);
+  }
+  int& target = (*keys.song_channels)[static_cast<std::size_t>(from) - 1];
+  if (target >= 0) {
+    throw CLI::ValidationError("--channel", "names channel " + word.substr(0, sign) + " twice");
+  }
+  target = static_cast<int>(to) - 1;
+  *keys.channels |= 1U << target;
+}
+
+}  // namespace
+
 void add_keys(CLI::App& command, KeyOptions& keys) {
   command.add_option("--tuning", keys.scale, "Scala scale, NAME.scl")->type_name("FILE");
   command.add_option("--keyboard-map", keys.keyboard_map, "Scala keyboard map, NAME.kbm")
@@ -139,19 +164,19 @@ void add_keys(CLI::App& command, KeyOptions& keys) {
       ->type_name("HZ")
       ->check(within(220.0, 880.0));
   command
-      .add_option_function<std::vector<int>>(
+      .add_option_function<std::vector<std::string>>(
           "--channel",
-          [&keys](const std::vector<int>& channels) {
-            unsigned mask = 0;
-            for (const int channel : channels) {
-              mask |= 1U << (channel - 1);
+          [&keys](const std::vector<std::string>& words) {
+            keys.channels = 0;
+            keys.song_channels.emplace().fill(-1);
+            for (const std::string& word : words) {
+              add_channel(keys, word);
             }
-            keys.channels = mask;
           },
-          "MIDI channels to receive (default: the preset's)")
-      ->type_name("N,...")
-      ->delimiter(',')
-      ->check(within(1, 16));
+          "MIDI channels to receive (default: the preset's); 3=1 plays channel 3 of a MIDI file on "
+          "channel 1")
+      ->type_name("N|FROM=TO,...")
+      ->delimiter(',');
   command.add_option("--transpose", keys.transpose, "semitones added to every preset's keys")
       ->type_name("SEMITONES")
       ->check(within(-most_transpose, most_transpose));

@@ -306,7 +306,8 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
   if (const std::string unused = unused_keys(options, is_bare); !unused.empty()) {
     scene->warnings.push_back(unused);
   }
-  auto midi = options.midi.empty() ? Result<MidiFile>(MidiFile()) : read_midi_file(options.midi);
+  auto midi = options.midi.empty() ? Result<MidiFile>(MidiFile())
+                                   : read_midi_file(options.midi, options.keys.song_channels);
   if (!midi) {
     return midi.error();
   }

@@ -53,7 +53,7 @@ Result<Done> command::learn(ConsoleContext& console, Words words) {
   if (auto begun = console.session.learn(target); !begun) {
     return begun.error();
   }
-  console.print("move the knob that is to control " + target);
+  console.print("turn the knob that is to control " + target + " to the right and back");
   return Done{};
 }
 
@@ -63,11 +63,14 @@ Result<Done> command::unlearn(ConsoleContext& console, Words words) {
     return nothing_loaded;
   }
   const std::string target = words.empty() ? "" : meant_target(current->instrument, words[0]);
-  const std::size_t count = console.session.unlearn(target);
-  if (count == 0 && !target.empty()) {
+  const auto count = console.session.unlearn(target);
+  if (!count) {
+    return count.error();
+  }
+  if (*count == 0 && !target.empty()) {
     return Error{"no controller is assigned to '" + target + "'"};
   }
-  console.print(counted(count, "controller has", "controllers have") +
+  console.print(counted(*count, "controller has", "controllers have") +
                 " the function in the preset again");
   return Done{};
 }

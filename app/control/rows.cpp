@@ -274,26 +274,27 @@ std::vector<Row> make_rows() {
        .act = command::control},
       {.address = "/learn",
        .arguments = {{.word = "TARGET", .is_text = true}},
-       .does =
-           "assigns the next knob that moves to a control or a parameter; replies /done or /fail",
+       .does = "assigns the next knob that you turn to a control or a parameter; replies /done or "
+               "/fail",
        .answer = answer::learn,
        .command = "learn",
        .group = CommandGroup::parameters,
        .words = "CONTROL|PARAMETER",
-       .command_does = "assigns the next knob that you move to a control or a parameter",
+       .command_does = "assigns the next knob that you turn to a control or a parameter",
        .details =
-           "It may also be an OSC address of the preset, such as /finger. The knob loses its "
-           "other\nfunction until 'unlearn', in every preset that has this target. 'save NAME' "
-           "saves the\nassignment.",
+           "Turn it to the right and back, so that encoders are recognised. It may also be an OSC "
+           "address of\nthe preset, such as /finger. The knob loses its other function until "
+           "'unlearn', in every preset\nthat has this target. The mapping of controllers keeps the "
+           "assignment for the next start.",
        .act = command::learn},
       {.address = "/unlearn",
        .arguments = {{.word = "TARGET", .is_text = true}},
-       .does = "restores the preset's assignment of the target's knob; replies /done or /fail",
+       .does = "ends the assignment of the target's knobs; replies /done or /fail",
        .answer = answer::unlearn,
        .command = "unlearn",
        .group = CommandGroup::parameters,
        .words = "[CONTROL|PARAMETER]",
-       .command_does = "restores the preset's assignment of a knob, or of all knobs",
+       .command_does = "ends the assignment of a knob, or of all knobs learned since the start",
        .act = command::unlearn},
       {.command = "undo",
        .group = CommandGroup::parameters,
@@ -397,7 +398,7 @@ std::vector<Row> make_rows() {
        .words = "NAME [--force]",
        .command_does = "saves the current sound as your own preset",
        .details =
-           "Writes parameter values and assigned controllers to NAME.toml in your preset folder, "
+           "Writes parameter values to NAME.toml in your preset folder, "
            "\n$XDG_DATA_HOME/ressort/presets or ~/.local/share/ressort/presets. 'load NAME' loads "
            "it. --force\noverwrites an existing preset.",
        .act = command::save},

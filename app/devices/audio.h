@@ -19,7 +19,7 @@ struct AudioOptions {
   double rate_hz = 48000.0;        // ignored by JACK, which has its own
   int period_frames = 256;         // ignored by JACK, which has its own
   std::string device = "default";  // ALSA only
-  bool sends_midi = false;         // a port for messages to controllers (JACK)
+  bool sends_midi = false;         // a port for messages to controllers
   Wiring wiring;                   // connections of the lost device, to be restored
 };
 

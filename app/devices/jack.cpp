@@ -56,6 +56,20 @@ struct Jack {
   std::array<MidiPacket, most_midi_packets> packets;
 };
 
+Transport transport_of(const Jack& jack) {
+  jack_position_t at;
+  const bool rolls = jack_transport_query(jack.client, &at) == JackTransportRolling;
+  if ((at.valid & JackPositionBBT) == 0 || at.ticks_per_beat <= 0.0) {
+    return {.rolls = rolls, .position = at.frame / jack.rate_hz};
+  }
+  const double bars = at.bar - 1;
+  return {.beats_per_s = at.beats_per_minute / 60.0,
+          .rolls = rolls,
+          .in_beats = true,
+          .position = bars * static_cast<double>(at.beats_per_bar) + at.beat - 1 +
+                      at.tick / at.ticks_per_beat};
+}
+
 // libjack may cancel the thread of any callback when the server ends, so each callback begins with
 // a guard.
 int on_process(jack_nframes_t frames, void* self) {
@@ -89,10 +103,7 @@ int on_process(jack_nframes_t frames, void* self) {
   if (jack_get_cycle_times(jack.client, &frame, &now_us, &next_us, &period_us) != 0) {
     now_us = jack_get_time();
   }
-  jack_position_t position;
-  jack_transport_query(jack.client, &position);
-  jack.process.set_transport_tempo(
-      (position.valid & JackPositionBBT) != 0 ? position.beats_per_minute / 60.0 : 0.0);
+  jack.process.set_transport(transport_of(jack));
   jack.process.block(std::span<const float* const>(jack.input_buffers.data(), inputs),
                      std::span<float* const>(jack.output_buffers), frames,
                      {jack.packets.data(), count},

@@ -1,4 +1,4 @@
-// app/devices: MIDI from outside JACK, through RtMidi.
+// app/devices: MIDI outside of JACK's audio clients, through RtMidi.
 #pragma once
 
 #include <memory>
@@ -30,15 +30,18 @@ class MidiSink {
 enum class MidiApi { alsa, jack };
 
 // Listens to all MIDI sources, including ones plugged in later, and opens a port that others can
-// connect to.
+// connect to, and if messages go to controllers another one for them.
 class MidiInput {
  public:
   static Result<std::unique_ptr<MidiInput>> open(MidiApi api, const std::string& client_name,
-                                                 bool connect, MidiSink& door);
+                                                 bool connect, MidiSink& door,
+                                                 Process* sender = nullptr);
   ~MidiInput();
 
   // Connects new sources and drops unplugged ones. Call it about once a second. [control]
   void tick();
+  // Sends the messages that wait for controllers. [control]
+  void send();
 
  private:
   struct Sources;

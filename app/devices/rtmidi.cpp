@@ -50,6 +50,8 @@ struct MidiInput::Sources {
   std::string client;
   bool connect;
   MidiSink& door;
+  Process* sender;                                           // null: nothing is sent
+  std::unique_ptr<RtMidiOut> out;                            // the port to controllers
   std::unique_ptr<MidiPort> own;                             // the port that others connect to
   std::map<std::string, std::unique_ptr<MidiPort>> sources;  // ports by name
 };
@@ -58,7 +60,7 @@ MidiInput::MidiInput(std::unique_ptr<Sources> sources) : sources_(std::move(sour
 MidiInput::~MidiInput() = default;
 
 Result<std::unique_ptr<MidiInput>> MidiInput::open(MidiApi api, const std::string& client_name,
-                                                   bool connect, MidiSink& door) {
+                                                   bool connect, MidiSink& door, Process* sender) {
   const Error missing{api == MidiApi::alsa
                           ? "there is no ALSA sequencer (/dev/snd/seq), so there is no "
                             "MIDI through ALSA; play by OSC or from the console"
@@ -68,7 +70,14 @@ Result<std::unique_ptr<MidiInput>> MidiInput::open(MidiApi api, const std::strin
   }
   const RtMidi::Api rt_api = api == MidiApi::alsa ? RtMidi::LINUX_ALSA : RtMidi::UNIX_JACK;
   try {
-    auto sources = std::make_unique<Sources>(Sources{rt_api, client_name, connect, door, {}, {}});
+    auto sources =
+        std::make_unique<Sources>(Sources{rt_api, client_name, connect, door, sender, {}, {}, {}});
+    if (sender != nullptr) {
+      sources->out = std::make_unique<RtMidiOut>(rt_api, client_name);
+      sources->out->openVirtualPort("midi_out");
+      sources->out->setErrorCallback(ignore_message);
+      sender->has_midi_out.raise();
+    }
     sources->own = std::make_unique<MidiPort>(rt_api, client_name, door);
     sources->own->input.openVirtualPort("midi_in");
     sources->own->input.setErrorCallback(ignore_message);
@@ -105,6 +114,13 @@ void MidiInput::tick() {
     });
   } catch (const RtMidiError&) {
     return;  // a source vanished meanwhile; the next tick handles it
+  }
+}
+
+void MidiInput::send() {
+  MidiBytes message;
+  while (sources_->sender != nullptr && sources_->sender->to_controllers.pop(message)) {
+    sources_->out->sendMessage(message.data(), message.size());
   }
 }
 

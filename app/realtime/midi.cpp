@@ -4,6 +4,8 @@
 #include <functional>
 #include <numeric>
 
+#include "app/realtime/song_clock.h"
+
 namespace ressort::realtime {
 namespace {
 
@@ -20,13 +22,17 @@ int data_bytes(std::uint8_t status) {
   }
 }
 
+Event clock_event(ClockMessage message, double value = 0.0) {
+  return {.kind = EventKind::clock, .index = static_cast<std::uint16_t>(message), .value = value};
+}
+
 }  // namespace
 
 bool MidiReader::take(std::uint8_t byte, Event& event) {
-  if (byte >=
-      0xf8) {  // real-time messages (clock, active sensing, reset) may interrupt any message
-    event = {.kind = EventKind::clock};
-    return byte == 0xf8;
+  if (byte >= 0xf8) {  // a real-time message, which may interrupt any other
+    using enum ClockMessage;
+    event = clock_event(byte == 0xfa ? start : byte == 0xfb ? resume : byte == 0xfc ? stop : tick);
+    return byte == 0xf8 || (byte >= 0xfa && byte <= 0xfc);
   }
   if (byte >= 0x80) {
     if (in_exclusive_ && byte == 0xf7) {
@@ -99,9 +105,12 @@ bool MidiReader::finish(Event& event) {
       event.value = bend < 0 ? bend / 8192.0 : bend / 8191.0;
       return true;
     }
-    case 0xf0:
-      status_ = 0;
-      return false;  // system common has no running status
+    case 0xf0: {
+      const bool is_position = status_ == 0xf2;
+      event = clock_event(ClockMessage::song_position, data_[1] << 7 | data_[0]);
+      status_ = 0;  // system common has no running status
+      return is_position;
+    }
     default:
       return false;
   }

@@ -44,8 +44,10 @@ constexpr MidiChartRow rows[] = {
     {"SysEx tuning dump", "F0 7E id 08 01", true, "all 128 keys, for new notes"},
     {"SysEx octave tuning", "F0 7F id 08 08, 08 09", true, "cents of the twelve keys of every octave, in one or two bytes; also for sounding notes, with 7E only for new notes; the channel mask is ignored"},
     {"other SysEx", "", false, ""},
-    {"timing clock", "F8", true, "24 in a beat: sets the rate of LFOs in beats"},
-    {"other system common, real time", "", false, "no start, stop or song position"},
+    {"timing clock", "F8", true, "24 in a beat: sets the rate of LFOs in beats, and the tempo of a song that follows the clock"},
+    {"start, continue, stop", "FA to FC", true, "of a song that follows the clock; it starts at the next tick"},
+    {"song position", "F2", true, "of a song that follows the clock, in sixteenth notes"},
+    {"other system common, real time", "", false, ""},
 };
 // clang-format on
 

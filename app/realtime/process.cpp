@@ -131,6 +131,9 @@ void Process::run(std::span<const Sample* const> inputs, std::span<Sample* const
   }
   follow_present_values();
   midi_out_ = mapper_.messages();
+  for (const MidiBytes& message : midi_out_) {
+    has_midi_out.is_raised() ? to_controllers.push(message) : false;
+  }
   write_motion();
   publish_meters();
   if (clock_ns_ != nullptr && !has_time.is_raised()) {
@@ -178,9 +181,11 @@ void Process::collect_events(std::size_t frames, std::span<const MidiPacket> mid
                              std::int64_t time_ns) {
   now_.clear();
   next_now_ = 0;
-  if (std::exchange(known_transport_tempo_, transport_tempo_) != transport_tempo_) {
-    add_now(frame_, {.kind = EventKind::tempo, .value = transport_tempo_});
+  const double beats_per_s = transport_.beats_per_s;
+  if (std::exchange(known_transport_tempo_, beats_per_s) != beats_per_s) {
+    add_now(frame_, {.kind = EventKind::tempo, .value = beats_per_s});
   }
+  song_clock_.follow(transport_, frame_, static_cast<double>(frames) / rate_hz_);
   // The session first, so that an answer from another source overrides it.
   read_ring(from_session, frames, time_ns);
   read_ring(from_osc, frames, time_ns);
@@ -317,22 +322,26 @@ void Process::follow_banks(const Event& event) {
   }
 }
 
-// Counts notes and controllers for the meters.
+// Counts notes for the meters, and reports controllers to the one who learns them.
 void Process::count_event(const Event& event) {
   if (event.kind == EventKind::note_on) {
     meters_.last_notes[meters_.notes++ % meters_.last_notes.size()] = {
         static_cast<std::uint8_t>(event.index),
         static_cast<std::uint8_t>(std::clamp(std::lround(127.0 * event.value), 1L, 127L))};
-  } else if (event.kind == EventKind::controller && event.model == 0) {
-    ++meters_.turns;
-    meters_.last_controller = static_cast<std::uint8_t>(event.index);
+  } else if (event.kind == EventKind::controller && event.model == 0 &&
+             hears_controllers.is_raised()) {
+    reports.push({Report::Kind::heard, event.channel, event.index, event.value});
   }
 }
 
-// Converts a tick of a MIDI clock to a tempo. Returns false if the event is to be ignored.
+// Follows a MIDI clock, and converts a tick to a tempo. Returns false if the event is to be
+// ignored.
 bool Process::follow_tempo(Event& event, std::int64_t frame) {
   constexpr double least_change = 1e-4;  // relative; frames round the ticks' times
   if (event.kind == EventKind::clock) {
+    if (!song_clock_.follow(event, frame)) {
+      return false;
+    }
     event.kind = EventKind::tempo;
     event.value = tick_clock_.add(frame, rate_hz_);
     if (std::fabs(event.value - tempo_) <= least_change * tempo_) {
@@ -514,6 +523,7 @@ void Process::play(PlayingEngine& sounding, std::size_t input_count, std::vector
 // Publishes the meters and reports changed parameters, after the sound is done.
 void Process::publish_meters() {
   meters_.frames = static_cast<std::uint64_t>(frame_);
+  meters_.song = song_clock_.place();
   if (current_ == nullptr) {
     board.write(meters_);
     return;

@@ -13,6 +13,7 @@
 #include "app/realtime/lockfree.h"
 #include "app/realtime/midi.h"
 #include "app/realtime/motion.h"
+#include "app/realtime/song_clock.h"
 #include "app/realtime/tick_clock.h"
 #include "core/engine/dc_blocker.h"
 #include "core/engine/engine.h"
@@ -51,9 +52,9 @@ struct MidiPacket {
 
 // A message from the audio thread to the worker.
 struct Report {
-  enum class Kind : std::uint8_t { parameter, controller, reset, overload, program, action };
+  enum class Kind : std::uint8_t { parameter, controller, reset, overload, program, action, heard };
   Kind kind = Kind::reset;
-  std::uint32_t model = 0;  // serial of the model
+  std::uint32_t model = 0;  // serial of the model; of a controller that was heard, its channel
   // Parameter, controller, number of voices that there is time for (0: unlimited), or row of an
   // action.
   std::uint16_t index = 0;
@@ -99,9 +100,8 @@ struct Meters : EngineMeters {
   std::uint64_t xruns = 0;        // reported by the backend
   std::uint64_t notes = 0;        // note-ons so far, from any source
   std::array<PlayedNote, 4> last_notes{};  // the latest notes; note n is at n modulo 4
-  std::uint64_t turns = 0;                 // controller events so far
-  std::uint8_t last_controller = 0;        // controller number of the latest
   double tempo = 0.0;  // beats per minute of a MIDI clock or of JACK; 0: no clock so far
+  SongPlace song;      // of the clock or of JACK
 };
 
 struct Process {
@@ -151,9 +151,9 @@ struct Process {
   // discards them. [OSC's thread] wait-free
   bool send_ahead(std::span<const TimedEvent> events);
 
-  // Sets the tempo of JACK's transport for the next block, in beats per second; 0: it has none. The
-  // transport and a MIDI clock replace each other's tempo when theirs changes. [audio] wait-free
-  void set_transport_tempo(double beats_per_s) { transport_tempo_ = beats_per_s; }
+  // Sets JACK's transport for the next block. The transport and a MIDI clock replace each other's
+  // tempo when theirs changes. [audio] wait-free
+  void set_transport(const Transport& now) { transport_ = now; }
 
   // Applies a record of a flight before the block that it belongs to; block() then reproduces the
   // original samples. Offline only, for one whole flight, chunk by chunk. [audio]
@@ -174,6 +174,9 @@ struct Process {
   TripleBuffer<ControllerMap> controllers{
       ControllerMap{}};        // written by the session, under its lock
   Ring<Report> reports{4096};  // read by the session's worker
+  Flag hears_controllers;      // reports every controller message, before the mapping
+  Ring<MidiBytes> to_controllers{1024};  // messages to controllers, for RtMidi
+  Flag has_midi_out;                     // somebody reads them
   Ring<RecordedChunk> recording{8192};
   Flag is_recording;
   Ring<RecordedChunk> listening{1024};  // read by the timbre analysis
@@ -240,8 +243,9 @@ struct Process {
   std::uint64_t order_ = 0;
   MidiReader midi_;
   TickClock tick_clock_;
+  SongClock song_clock_;
   double tempo_ = 0.0;                  // beats per second; 0: no clock so far
-  double transport_tempo_ = 0.0;        // the same, of JACK
+  Transport transport_;                 // of JACK
   double known_transport_tempo_ = 0.0;  // the last one that became an event
   PlayingEngine* current_ = nullptr;
   PlayingEngine* fading_ = nullptr;

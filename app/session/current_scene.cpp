@@ -9,17 +9,13 @@
 #include "core/model/preset/edit.h"
 
 namespace ressort::session {
-namespace {
-
-// Returns false for controllers that are no knobs: bank select, data entry, parameter numbers,
-// pedals, and channel mode messages from 120 on.
-bool is_knob(int controller) {
-  constexpr int others[] = {0, 6, 32, 38, 64, 66, 67, 96, 97, 98, 99, 100, 101};
-  return controller < 120 &&
-         std::find(std::begin(others), std::end(others), controller) == std::end(others);
+CurrentScene::CurrentScene(Process& process, const std::vector<ControllerSetting>& controllers,
+                           std::string controllers_path)
+    : process_(process), controllers_path_(std::move(controllers_path)) {
+  for (const ControllerSetting& setting : controllers) {
+    mapping_.push_back({.setting = setting});
+  }
 }
-
-}  // namespace
 
 CurrentScene::Present CurrentScene::present() const {
   const std::lock_guard lock(mutex_);
@@ -62,7 +58,7 @@ void CurrentScene::replace(std::shared_ptr<const Loaded> loaded, std::vector<dou
   for (const KnobInfo& knob : loaded_->instrument.knobs) {
     turned_.push_back(knob.rest);
   }
-  waiting_target_.reset();
+  stop_learning();
   send_mapping();
 }
 
@@ -235,32 +231,28 @@ void CurrentScene::show_parameter(ControlSource source, int number, const std::s
   }
 }
 
-std::vector<MappedRow> CurrentScene::rows() const {
-  std::vector<MappedRow> rows;
-  for (const LearnedRow& row : learned_) {
-    const ControllerInput input{.number = static_cast<std::uint16_t>(row.controller)};
-    rows.push_back({{input, row.target}, true, target_of(row.target).exists});
-  }
-  for (const ControllerSetting& setting : controllers_) {
-    rows.push_back({setting, false, target_of(setting.target).exists});
-  }
-  return rows;
-}
-
 std::vector<MappedRow> CurrentScene::mapping() const {
   const std::lock_guard lock(mutex_);
-  return rows();
+  return mapping_;
 }
 
-// Sends the whole mapping. Of two rows for a message the first acts, so learned ones override.
+std::string CurrentScene::action(std::size_t row) const {
+  const std::lock_guard lock(mutex_);
+  return row < mapping_.size() && is_action(mapping_[row].setting.target)
+             ? mapping_[row].setting.target
+             : "";
+}
+
+// Sends the whole mapping. Of two rows for a message the first acts.
 void CurrentScene::send_mapping() {
   ControllerMap& map = process_.controllers.writing();
   map.count = 0;
-  for (const MappedRow& row : rows()) {
+  for (MappedRow& row : mapping_) {
     MappedController& mapped = map.rows[map.count];
     mapped = {row.setting.input, target_of(row.setting.target)};
+    row.exists = mapped.target.exists;
     if (mapped.target.kind == EventKind::program) {
-      mapped.target.index = static_cast<std::uint16_t>(map.count - learned_.size());
+      mapped.target.index = static_cast<std::uint16_t>(map.count);
     }
     ++map.count;
   }
@@ -268,7 +260,6 @@ void CurrentScene::send_mapping() {
 }
 
 Result<Done> CurrentScene::learn(const std::string& target) {
-  const std::uint64_t turns = process_.meters().turns;
   const std::lock_guard lock(mutex_);
   const MappedTarget found = target_of(target);
   if (!found.exists || is_action(target) || controller_number(target) >= 0) {
@@ -287,23 +278,49 @@ Result<Done> CurrentScene::learn(const std::string& target) {
     return Error{"there is no parameter or control '" + target + "'; there are " +
                  (known.empty() ? "none" : joined(known, ", ")) + did_you_mean(target, known)};
   }
+  if (mapping_.size() >= most_controllers) {
+    return Error{"the mapping has " + std::to_string(most_controllers) +
+                 " rows, the most that there can be; 'unlearn NAME' removes one"};
+  }
   waiting_target_ = target;
-  turns_before_ = turns;
+  learner_ = KnobLearner();
+  process_.hears_controllers.raise();
   return Done{};
 }
 
-std::size_t CurrentScene::unlearn(const std::string& target) {
-  const std::lock_guard lock(mutex_);
+void CurrentScene::stop_learning() {
   waiting_target_.reset();
-  const std::size_t count = std::erase_if(
-      learned_, [&](const LearnedRow& row) { return target.empty() || row.target == target; });
-  send_mapping();
-  return count;
+  process_.hears_controllers.lower();
 }
 
-std::vector<LearnedRow> CurrentScene::learned() const {
+Result<std::size_t> CurrentScene::unlearn(const std::string& target) {
   const std::lock_guard lock(mutex_);
-  return learned_;
+  stop_learning();
+  std::vector<ControllerSetting> dropped;
+  std::erase_if(mapping_, [&](const MappedRow& row) {
+    const bool goes =
+        target.empty() ? row.is_learned : word_of(row.setting.target) == word_of(target);
+    if (goes) {
+      dropped.push_back(row.setting);
+    }
+    return goes;
+  });
+  send_mapping();
+  if (dropped.empty()) {
+    return std::size_t{0};
+  }
+  const auto written = write_mapping(
+      [&](const ControllerSetting& row) {
+        return std::find(dropped.begin(), dropped.end(), row) != dropped.end();
+      },
+      std::nullopt);
+  return written ? Result<std::size_t>(dropped.size()) : written.error();
+}
+
+void CurrentScene::hear(int channel, int controller, int value) {
+  const std::lock_guard lock(mutex_);
+  learner_.add(channel, controller, value);
+  heard_time_ = std::chrono::steady_clock::now();
 }
 
 std::optional<std::string> CurrentScene::waiting_target() const {
@@ -311,18 +328,59 @@ std::optional<std::string> CurrentScene::waiting_target() const {
   return waiting_target_;
 }
 
-std::optional<LearnedRow> CurrentScene::assign_moved_controller(const Meters& now) {
+std::optional<Learned> CurrentScene::assign_turned_knob() {
+  using namespace std::chrono_literals;
+  constexpr auto rest = 700ms;  // longer than the pause of a hand that turns back
   const std::lock_guard lock(mutex_);
-  if (!waiting_target_ || now.turns == turns_before_ || !is_knob(now.last_controller)) {
+  const auto input = learner_.found();
+  if (!waiting_target_ || !input || std::chrono::steady_clock::now() - heard_time_ < rest) {
     return std::nullopt;
   }
-  const LearnedRow row{now.last_controller, *std::exchange(waiting_target_, std::nullopt)};
-  std::erase_if(learned_, [&](const LearnedRow& before) {
-    return before.target == row.target || before.controller == row.controller;
-  });
-  learned_.push_back(row);
+  ControllerSetting setting{*input, *waiting_target_};
+  stop_learning();
+  // The channel counts only if the mapping has this controller for another channel too.
+  const auto is_alike = [&](const MappedRow& row) {
+    return row.setting.input.source == input->source && row.setting.input.number == input->number &&
+           row.setting.input.channel != ControllerInput::any_channel;
+  };
+  if (std::none_of(mapping_.begin(), mapping_.end(), is_alike)) {
+    setting.input.channel = ControllerInput::any_channel;
+  }
+  for (const MappedRow& row : mapping_) {
+    if (row.setting.input.is_same_source(setting.input)) {
+      setting.input.picks_up |= row.setting.input.picks_up;
+      setting.input.sends |= row.setting.input.sends;
+    }
+  }
+  const auto is_replaced = [&](const ControllerSetting& row) { return setting.replaces(row); };
+  std::erase_if(mapping_, [&](const MappedRow& row) { return is_replaced(row.setting); });
+  mapping_.insert(mapping_.begin(), {.setting = setting, .is_learned = true});
   send_mapping();
-  return row;
+  const auto written = write_mapping(is_replaced, setting);
+  return Learned{setting, written ? std::nullopt : std::optional(written.error())};
+}
+
+// Reads the file again, because the user may have edited it.
+Result<Done> CurrentScene::write_mapping(
+    const std::function<bool(const ControllerSetting&)>& is_dropped,
+    const std::optional<ControllerSetting>& added) const {
+  std::error_code error;
+  if (controllers_path_.empty()) {
+    return Done{};
+  }
+  std::filesystem::create_directories(std::filesystem::path(controllers_path_).parent_path(),
+                                      error);
+  const auto before = std::filesystem::exists(controllers_path_, error)
+                          ? read_text(controllers_path_, max_preset_bytes)
+                          : Result<std::string>("");
+  if (!before) {
+    return before.error();
+  }
+  const auto after = edit_controllers(*before, is_dropped, added);
+  if (!after) {
+    return Error{controllers_path_ + ": " + after.error().message};
+  }
+  return *after == *before ? Done{} : write_text(controllers_path_, *after, Existing::replace);
 }
 
 Result<std::string> CurrentScene::preset_text(const std::string& model, double extra_gain,
@@ -333,31 +391,6 @@ Result<std::string> CurrentScene::preset_text(const std::string& model, double e
   }
   PresetChanges changes;
   changes.parameters = changed_settings(loaded_->instrument.parameters, loaded_->preset, values_);
-  for (const LearnedRow& row : learned_) {
-    const MappedTarget control = target_of(row.target);
-    for (const ControlSetting& setting : loaded_->preset.controls) {
-      const bool is_knob = control.kind == EventKind::controller &&
-                           setting.source == ControlSource::controller &&
-                           setting.number == control.index;
-      if (is_knob || (setting.source == ControlSource::osc && setting.address == row.target)) {
-        ControlSetting same = setting;
-        same.source = ControlSource::controller;
-        same.number = row.controller;
-        same.name.clear();  // the knob itself keeps its name
-        same.help.clear();
-        changes.learned.push_back(std::move(same));
-      }
-    }
-    if (control.exists && control.kind == EventKind::parameter) {
-      changes.learned.push_back({.source = ControlSource::controller,
-                                 .number = row.controller,
-                                 .target = row.target,
-                                 .gesture = Gesture::parameter,
-                                 .low = control.range.low,
-                                 .high = control.range.high,
-                                 .exponential = control.range.exponential});
-    }
-  }
   changes.model = model;
   changes.through = std::move(through);
   changes.gain = loaded_->instrument.gain / extra_gain;

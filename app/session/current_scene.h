@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -12,6 +13,7 @@
 #include <vector>
 
 #include "app/realtime/process.h"
+#include "app/session/knob_learner.h"
 #include "app/session/loader.h"
 #include "core/compile/compile.h"
 #include "core/model/preset/controllers.h"
@@ -33,16 +35,10 @@ struct Loaded {
   std::vector<std::string> warnings;
 };
 
-// A controller and its learned target: a parameter, or a control's OSC name.
-struct LearnedRow {
-  int controller = 0;
-  std::string target;
-};
-
 // A controller of the mapping, and what it does in the playing scene.
 struct MappedRow {
   ControllerSetting setting;
-  bool is_learned = false;
+  bool is_learned = false;  // since the start
   bool exists = false;  // false: the scene has no such parameter or control
 };
 
@@ -53,12 +49,18 @@ struct LastChange {
   std::vector<std::pair<std::string, double>> values;
 };
 
+// A controller that was learned, and the reason why it could not be written to the mapping.
+struct Learned {
+  ControllerSetting setting;
+  std::optional<Error> failure;
+};
+
 // All functions: [any thread but audio], unless they say otherwise.
 class CurrentScene {
  public:
-  // `controllers`: the user's mapping, which learned controllers override.
-  CurrentScene(Process& process, std::vector<ControllerSetting> controllers)
-      : process_(process), controllers_(std::move(controllers)) {}
+  // `controllers`: the user's mapping, and its file; empty: learned rows are not written.
+  CurrentScene(Process& process, const std::vector<ControllerSetting>& controllers,
+               std::string controllers_path);
 
   // The scene, the values of its parameters and the positions of its knobs at one moment.
   struct Present {
@@ -92,21 +94,22 @@ class CurrentScene {
   // Returns the last change and forgets it. Changes of the same parameters within a second are one.
   std::optional<LastChange> take_last_change();
 
-  // The next knob that moves gets this target. See Session::learn().
+  // The next knob that is turned gets this target. See Session::learn().
   Result<Done> learn(const std::string& target);
-  // Forgets the controllers of this target, or all if it is empty. Returns how many.
-  std::size_t unlearn(const std::string& target);
-  std::vector<LearnedRow> learned() const;
+  // Forgets the controllers of this target, or all learned ones if it is empty. Returns how many.
+  Result<std::size_t> unlearn(const std::string& target);
   // Returns the target that waits for a knob, or nothing.
   std::optional<std::string> waiting_target() const;
   // Returns all controllers of the mapping, learned ones first.
   std::vector<MappedRow> mapping() const;
-  // Returns the target of a row of the user's mapping.
-  const std::string& action(std::size_t row) const { return controllers_[row].target; }
-  // Gives the waiting target to the controller that has moved. Returns the pair. [worker]
-  std::optional<LearnedRow> assign_moved_controller(const Meters& now);
+  // Returns the action of a row of the mapping; empty if it has another target.
+  std::string action(std::size_t row) const;
+  // Follows a controller message while a knob is learned. [worker]
+  void hear(int channel, int controller, int value);
+  // Once the knob is at rest, gives it the waiting target, and writes the mapping. [worker]
+  std::optional<Learned> assign_turned_knob();
 
-  // Returns the preset with the present values and learned controllers, with this model and,
+  // Returns the preset with the present values, with this model and,
   // if given, with these models of `through`. `extra_gain` is the factor that the session applies
   // to all presets.
   Result<std::string> preset_text(const std::string& model, double extra_gain,
@@ -119,11 +122,13 @@ class CurrentScene {
   MappedTarget controller_target(int number) const;
   void show_parameter(ControlSource source, int number, const std::string& address,
                       MappedTarget& target) const;
-  std::vector<MappedRow> rows() const;
   void send_mapping();
+  void stop_learning();
+  Result<Done> write_mapping(const std::function<bool(const ControllerSetting&)>& is_dropped,
+                             const std::optional<ControllerSetting>& added) const;
 
   Process& process_;
-  const std::vector<ControllerSetting> controllers_;
+  const std::string controllers_path_;
   mutable std::mutex mutex_;  // guards all below, and the writing side of process_.controllers
   std::shared_ptr<const Loaded> loaded_ = std::make_shared<Loaded>();
   std::vector<double> values_;  // [parameter]
@@ -131,9 +136,10 @@ class CurrentScene {
   std::shared_ptr<const std::vector<SceneFile>> files_;
   std::optional<LastChange> last_change_;
   std::chrono::steady_clock::time_point change_time_;
-  std::vector<LearnedRow> learned_;
-  std::optional<std::string> waiting_target_;  // gets the next controller that moves
-  std::uint64_t turns_before_ = 0;             // Meters::turns when the waiting began
+  std::vector<MappedRow> mapping_;
+  std::optional<std::string> waiting_target_;         // gets the next knob that is turned
+  KnobLearner learner_;                               // hears its messages
+  std::chrono::steady_clock::time_point heard_time_;  // of the last one
 };
 
 // Returns the parameters to save in a preset, with their ranges: those that the preset has and

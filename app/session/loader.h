@@ -1,6 +1,7 @@
 // app/session: reads scenes: finds the files of a model or preset and parses them.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -49,11 +50,14 @@ std::string with_source(const Finding& finding);
 
 // Tuning options that override the preset.
 struct KeyOptions {
+  // [channel of a MIDI file] channel that its messages play on; -1: they are left out.
+  using SongChannels = std::array<int, 16>;
   std::string scale;                 // path of a Scala file; empty: the preset's
   std::string keyboard_map;          // the same for a keyboard map
   std::optional<double> a4_hz;       // frequency of A4
   int transpose = 0;                 // semitones, added to the preset's
   std::optional<unsigned> channels;  // bit mask of the received MIDI channels
+  std::optional<SongChannels> song_channels = {};
 };
 
 // The frequencies of all keys, or the error.

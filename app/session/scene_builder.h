@@ -24,6 +24,7 @@ struct SessionOptions {
   std::optional<ThirdArgument> third;               // overrides every model's own meaning
   KeyOptions keys;                                  // overrides every preset's tuning
   std::vector<ControllerSetting> controllers = {};  // the user's mapping
+  std::string controllers_path = {};                // its file, to which learned rows are written
   bool watch = false;          // reload the playing scene when its files change
   bool keeps_flights = false;  // records flights and saves them after problems
   // The clock that measures forms, and the file that keeps the results. Without a clock no form is

@@ -40,7 +40,7 @@ Session::Session(Process& process, const SessionOptions& options, MessageHandler
     : process_(process),
       options_(options),
       queue_(options.compile.rate_hz),
-      current_(process, options.controllers),
+      current_(process, options.controllers, options.controllers_path),
       flights_(process, flight_setup(options), options.keeps_flights),
       engines_(process, flights_),
       watch_(options.watch),

@@ -96,14 +96,13 @@ class Session {
   // parameters within a second are one.
   std::optional<LastChange> take_last_change() { return current_.take_last_change(); }
 
-  // MIDI learn: the next knob that moves controls the preset's knob of this name, this parameter,
-  // or the control with this OSC name, instead of its other function. Pedals, bank select and the
-  // like do not count. The pair is reported to `on_message`. It also acts in the next scenes that
-  // have the same target.
+  // MIDI learn: the next knob that is turned controls the preset's knob of this name, this
+  // parameter, or the control with this OSC name, instead of its other function. Its kind is
+  // recognised. Pedals, bank select and the like do not count. The row is reported to `on_message`
+  // and written to the mapping.
   Result<Done> learn(const std::string& target) { return current_.learn(target); }
-  // Forgets the controllers of this target, or all if it is empty. Returns how many.
-  std::size_t unlearn(const std::string& target) { return current_.unlearn(target); }
-  std::vector<LearnedRow> learned() const { return current_.learned(); }
+  // Forgets the controllers of this target, or all learned ones if it is empty. Returns how many.
+  Result<std::size_t> unlearn(const std::string& target) { return current_.unlearn(target); }
   std::optional<std::string> waiting_target() const { return current_.waiting_target(); }
   std::vector<MappedRow> mapping() const { return current_.mapping(); }
 

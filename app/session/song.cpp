@@ -8,6 +8,19 @@
 
 namespace ressort::session {
 
+double TempoMap::time_of(double beat) const {
+  const auto next = std::partition_point(tempos.begin() + 1, tempos.end(),
+                                         [&](const Tempo& row) { return row.beat <= beat; });
+  const Tempo& row = *(next - 1);
+  return row.time_s + (beat - row.beat) * 60.0 / row.beats_per_minute;
+}
+
+double TempoMap::beats_per_minute_at(double time_s) const {
+  const auto next = std::partition_point(tempos.begin() + 1, tempos.end(),
+                                         [&](const Tempo& row) { return row.time_s <= time_s; });
+  return (next - 1)->beats_per_minute;
+}
+
 double Song::State::position_s(Clock::time_point now) const {
   return plays ? at_s + tempo * std::chrono::duration<double>(now - at).count() : at_s;
 }
@@ -25,6 +38,7 @@ Result<Done> Song::change(bool is_jump, const std::function<void(State&)>& what)
   begin_change();
   what(state_);
   state_.jumps += is_jump ? 1 : 0;
+  is_led_ = is_led_ && !is_jump;
   return Done{};
 }
 
@@ -64,17 +78,50 @@ Result<Done> Song::set_tempo(double tempo) {
 }
 
 Result<Done> Song::follow_clock() {
-  return change(false, [&](State&) { follows_clock_ = true; });
+  return change(false, [&](State&) {
+    follows_clock_ = true;
+    known_jumps_.reset();
+  });
 }
 
-void Song::clock(double beats_per_minute) {
-  constexpr double least_change = 1e-4;
+// A clock that rolls when it is first followed leads as if it had just started. A message is played
+// a period after its time, so the place is that of a period before.
+void Song::clock(const Meters& now, const ClockReading& reading) {
+  constexpr double least_change = 1e-4;  // of the tempo
+  constexpr double least_error_s = 1e-3;
   const std::lock_guard lock(mutex_);
-  const double tempo = beats_per_minute / beats_per_minute_;
-  if (follows_clock_ && tempo >= least_tempo && tempo <= most_tempo &&
-      std::fabs(tempo - state_.tempo) > least_change * state_.tempo) {
-    begin_change();
-    state_.tempo = tempo;
+  if (!follows_clock_ || length_s_ < 0.0 || reading.rate_hz <= 0.0) {
+    return;
+  }
+  const SongPlace& place = now.song;
+  const auto frames = static_cast<double>(place.frame - reading.frame - reading.period);
+  const Clock::time_point at(
+      std::chrono::nanoseconds(reading.time_ns + std::llround(1e9 * frames / reading.rate_hz)));
+  const double at_s =
+      std::min(place.in_beats ? tempos_.time_of(place.position) : place.position, length_s_);
+  const bool jumps = known_jumps_ ? *known_jumps_ != place.jumps : place.rolls;
+  known_jumps_ = place.jumps;
+  is_led_ = jumps ? place.rolls : is_led_ && place.rolls;
+  const double here_s = jumps ? at_s : state_.position_s(Clock::now());
+  const double tempo =
+      is_led_ && !place.in_beats ? 1.0 : now.tempo / tempos_.beats_per_minute_at(here_s);
+  const bool has_new_tempo = tempo >= least_tempo && tempo <= most_tempo &&
+                             std::fabs(tempo - state_.tempo) > least_change * state_.tempo;
+  const bool is_wrong =
+      jumps || (is_led_ && state_.plays && std::fabs(state_.position_s(at) - at_s) > least_error_s);
+  if (!has_new_tempo && !is_wrong) {
+    return;
+  }
+  begin_change();
+  state_.tempo = has_new_tempo ? tempo : state_.tempo;
+  if (is_wrong) {
+    state_.at_s = at_s;
+    state_.at = at;
+  }
+  if (jumps) {
+    ++state_.jumps;
+    state_.plays = place.rolls;
+    is_over_ = false;
   }
 }
 
@@ -107,9 +154,9 @@ std::string Song::description() const {
   return is_over_ ? "the end, after " + fixed(length_s_, 1) + " s" : text;
 }
 
-void Song::begin(double length_s, double beats_per_minute, bool is_paused) {
+void Song::begin(double length_s, TempoMap tempos, bool is_paused) {
   const std::lock_guard lock(mutex_);
-  beats_per_minute_ = beats_per_minute;
+  tempos_ = std::move(tempos);
   length_s_ = length_s;
   state_.plays = !is_paused;
   state_.at = Clock::now();
@@ -138,6 +185,7 @@ void Song::go_back(const State& known) {
     state_.at_s = state_.loop_from_s;
     ++state_.jumps;
     ++state_.changes;
+    is_led_ = false;
   }
 }
 

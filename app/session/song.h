@@ -8,11 +8,25 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
 
-#include "app/rooms.h"
+#include "app/realtime/process.h"
 #include "core/result.h"
 
 namespace ressort::session {
+
+// The tempos of a MIDI file, in their order; the first one is at the start.
+struct TempoMap {
+  struct Tempo {
+    double beat = 0.0;
+    double time_s = 0.0;
+    double beats_per_minute = 120.0;
+  };
+  std::vector<Tempo> tempos{Tempo{}};
+
+  double time_of(double beat) const;
+  double beats_per_minute_at(double time_s) const;
+};
 
 class Song {
  public:
@@ -41,16 +55,16 @@ class Song {
   Result<Done> play(std::optional<double> from_s);
   Result<Done> pause();
   Result<Done> set_tempo(double tempo);           // 1 is the file's.
-  Result<Done> follow_clock();                    // The tempo is that of clock() from now on.
+  Result<Done> follow_clock();                    // Tempo and position are those of clock().
   Result<Done> loop(double from_s, double to_s);  // The same number twice ends the loop.
 
   bool is_over() const;             // True from the end of the file on, until play().
   std::string description() const;  // Returns for example "12.5 of 180 s, tempo 80 %".
 
   // For the player. [its thread]
-  void begin(double length_s, double beats_per_minute, bool is_paused);
-  // Tells the tempo of a MIDI clock or of JACK's transport, or 0 if there is none.
-  void clock(double beats_per_minute);
+  void begin(double length_s, TempoMap tempos, bool is_paused);
+  // Tells what a MIDI clock or JACK's transport does. Call it often.
+  void clock(const Meters& now, const ClockReading& reading);
   State state() const;
   // Waits until this time. Returns false as soon as the state differs from `known`.
   bool wait_until(Clock::time_point time, const State& known);
@@ -67,8 +81,10 @@ class Song {
   std::condition_variable wake_;
   State state_;
   double length_s_ = -1.0;           // negative: no song
-  double beats_per_minute_ = 120.0;  // of the file
+  TempoMap tempos_;
   bool follows_clock_ = false;
+  bool is_led_ = false;                       // the clock has started it
+  std::optional<std::uint64_t> known_jumps_;  // of the clock
   bool is_over_ = false;
 };
 

@@ -1,6 +1,7 @@
 #include "app/session/worker.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "app/session/files.h"
@@ -26,6 +27,16 @@ std::string to_text(const std::vector<Setting>& settings) {
     words.push_back(setting.parameter + " = " + print_number(setting.value));
   }
   return joined(words, ", ");
+}
+
+// Returns for example "controller 20, an encoder (offset),".
+std::string words_for(const ControllerInput& input) {
+  const bool is_nrpn = input.source == ControllerSource::nrpn;
+  return (is_nrpn ? "NRPN " : "controller ") + std::to_string(input.number) +
+         (input.has_14_bits ? " with 14 bits" : "") +
+         (input.mode == ControllerMode::absolute
+              ? ""
+              : ", an encoder (" + std::string(name_of(input.mode)) + "),");
 }
 
 }  // namespace
@@ -146,6 +157,9 @@ void Worker::load_preset(const std::string& name, const std::string& reason) {
 
 // Does what a button of the mapping asks for: next, previous or load.
 void Worker::press(const std::string& action) {
+  if (action.empty()) {
+    return;  // the mapping has just changed
+  }
   if (action == "next" || action == "previous") {
     return load_preset(preset_beside(queue_.newest_load(), action == "next" ? 1 : -1), action);
   }
@@ -180,6 +194,9 @@ void Worker::read_reports() {
       problems_.add_overload(report);
     } else if (report.kind == Report::Kind::program) {
       program = static_cast<int>(report.value);
+    } else if (report.kind == Report::Kind::heard) {
+      current_.hear(static_cast<int>(report.model), report.index,
+                    static_cast<int>(std::lround(127.0 * std::clamp(report.value, 0.0, 1.0))));
     } else if (report.kind == Report::Kind::action) {
       press(current_.action(report.index));
     }
@@ -188,9 +205,12 @@ void Worker::read_reports() {
     change_program(*program);
   }
   const Meters now = process_.meters();
-  if (const auto row = current_.assign_moved_controller(now)) {
-    on_message_("controller " + std::to_string(row->controller) + " now controls " + row->target +
-                "; 'unlearn " + row->target + "' ends that, 'save NAME' keeps it");
+  if (const auto learned = current_.assign_turned_knob()) {
+    const std::string& target = learned->setting.target;
+    on_message_(
+        words_for(learned->setting.input) + " now controls " + target + "; 'unlearn " + target +
+        "' ends that" +
+        (learned->failure ? "\nnot kept for the next start: " + learned->failure->message : ""));
   }
   if (const auto news = flights_.collect(now)) {
     on_message_(*news);

@@ -305,6 +305,8 @@ expect 2 "cannot be the output" "$program" render PolyTriangle -o good.score --s
 expect 2 "word.mdl' has no known sound file ending; use one of .wav, .w64, .flac, .ogg" \
   "$program" render PolyTriangle -o word.mdl
 expect 2 "must be -120 to 60, found nan" "$program" play -g nan
+expect 2 "must be 1 to 16, or FROM=TO, found 3=17" "$program" play --channel 3=17
+expect 2 "names channel 3 twice" "$program" play --channel 3,3=1
 expect 2 "not a finite number" "$program" check infinite.mdl
 model wrong.score '0.0 /in/7/force 1\n'
 expect 2 "wrong.score:1:5: error: /in/7/force" \

@@ -62,9 +62,6 @@ std::string current_state(const Session& session) {
   for (const double value : now.values) {
     state += " " + print_number(value);
   }
-  for (const LearnedRow& row : session.learned()) {
-    state += " " + row.target + " " + std::to_string(row.controller);
-  }
   for (const std::string& path : session.tuning()) {
     state += " " + path;
   }

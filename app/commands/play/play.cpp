@@ -74,7 +74,7 @@ class Player {
     }
     std::optional<MidiFile> song;
     if (is_midi_file_name(options_.midi)) {
-      auto read = read_midi_file(options_.midi);
+      auto read = read_midi_file(options_.midi, options_.keys.song_channels);
       if (!read) {
         return refuse(read.error().message);
       }
@@ -136,6 +136,7 @@ class Player {
                                                  .third = options_.third,
                                                  .keys = options_.keys,
                                                  .controllers = *std::move(controllers),
+                                                 .controllers_path = mapping_path(),
                                                  .watch = options_.watch,
                                                  .keeps_flights = true,
                                                  .time = cpu_time_ns,
@@ -166,7 +167,7 @@ class Player {
     if (song) {
       voice_.say("playing " + counted(song->messages.size(), "message", "messages") + " of MIDI, " +
                  fixed(song->length_s, 1) + " s");
-      session_->song().begin(song->length_s, song->beats_per_minute, options_.is_paused);
+      session_->song().begin(song->length_s, song->tempos, options_.is_paused);
       player_.emplace(*std::move(song), door_, session_->song());
     }
     return converse();
@@ -195,12 +196,15 @@ class Player {
   }
 
  private:
+  std::string mapping_path() const {
+    return options_.controllers.empty() ? controllers_path() : options_.controllers;
+  }
+
   // Reads the mapping of controllers. All errors are in one message.
   Result<std::vector<ControllerSetting>> read_controllers() const {
-    const bool is_given = !options_.controllers.empty();
-    const std::string path = is_given ? options_.controllers : controllers_path();
+    const std::string path = mapping_path();
     std::error_code error;
-    if (!is_given && !std::filesystem::exists(path, error)) {
+    if (options_.controllers.empty() && !std::filesystem::exists(path, error)) {
       return std::vector<ControllerSetting>();
     }
     const auto text = read_text(path, max_preset_bytes);
@@ -387,9 +391,6 @@ class Player {
     if (!device_.note.empty()) {
       voice_.say(device_.note);
     }
-    if (options_.device.sends_midi && device_.kind != "jack") {
-      voice_.say("'send' in the mapping of controllers needs JACK; nothing is sent");
-    }
     if (device_.kind != "dummy" && !may_raise_priority()) {
       voice_.say(
           "no permission for real-time priority, so the sound may drop out; to get it, run\n"
@@ -464,10 +465,14 @@ class Player {
     const bool wants_alsa =
         options_.midi == "alsa" || (options_.midi == "auto" && !device_.has_midi);
     if (!wants_jack && !wants_alsa) {
+      if (options_.device.sends_midi && !device_.has_midi) {
+        voice_.say("'send' in the mapping of controllers needs MIDI; nothing is sent");
+      }
       return;
     }
-    auto midi = MidiInput::open(wants_jack ? MidiApi::jack : MidiApi::alsa,
-                                options_.device.client_name, true, door_);
+    auto midi =
+        MidiInput::open(wants_jack ? MidiApi::jack : MidiApi::alsa, options_.device.client_name,
+                        true, door_, options_.device.sends_midi ? &process_ : nullptr);
     if (midi) {
       midi_ = *std::move(midi);
     } else {
@@ -529,8 +534,9 @@ class Player {
 
   int wait() {
     auto next_tick = std::chrono::steady_clock::now();
+    const auto patience = player_ || options_.device.sends_midi ? 5ms : 50ms;
     while (!quit_.is_raised()) {
-      if (is_called_off(50ms)) {
+      if (is_called_off(patience)) {
         return exit_code::done;
       }
       if (manager_) {
@@ -545,11 +551,14 @@ class Player {
           return exit_code::done;
         }
       }
-      session_->song().clock(process_.meters().tempo);
+      session_->song().clock(process_.meters(), process_.clock.read());
       if (options_.no_console && player_ && session_->song().is_over() && has_fallen_silent()) {
         return exit_code::done;
       }
       device_.tick();
+      if (midi_) {
+        midi_->send();
+      }
       if (std::chrono::steady_clock::now() >= next_tick) {
         next_tick += 1s;
         if (midi_) {

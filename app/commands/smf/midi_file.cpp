@@ -373,8 +373,13 @@ Result<MidiFile> parse_midi_file(Bytes file) {
       case TrackEvent::Kind::tempo:
         if (division.tick_s == 0.0) {
           tick_s = 1e-6 * event.count / division.ticks_per_quarter;
+          auto& tempos = midi.tempos.tempos;
+          if (tick == 0) {
+            tempos.clear();
+          }
+          tempos.push_back({static_cast<double>(tick) / division.ticks_per_quarter, midi.length_s,
+                            6e7 / event.count});
         }
-        midi.beats_per_minute = tick == 0 ? 6e7 / event.count : midi.beats_per_minute;
         break;
       case TrackEvent::Kind::end:
         break;
@@ -441,7 +446,20 @@ void release_all(MidiFile& midi) {
   }
 }
 
-Result<MidiFile> read_midi_file(const std::string& path) {
+void map_channels(MidiFile& midi, const KeyOptions::SongChannels& channels) {
+  std::erase_if(midi.messages, [&](const MidiFile::Message& message) {
+    std::uint8_t& status = midi.bytes[message.first];
+    if (status < 0x80 || status >= 0xf0) {
+      return false;  // a part of a SysEx
+    }
+    const int to = channels[status & 0x0f];
+    status = static_cast<std::uint8_t>((status & 0xf0) | std::max(0, to));
+    return to < 0;
+  });
+}
+
+Result<MidiFile> read_midi_file(const std::string& path,
+                                const std::optional<KeyOptions::SongChannels>& channels) {
   const auto bytes = read_bytes(path, max_midi_file_bytes);
   if (!bytes) {
     return bytes.error();
@@ -453,6 +471,9 @@ Result<MidiFile> read_midi_file(const std::string& path) {
   }
   for (std::string& warning : midi->warnings) {
     warning = path + ": " + warning;
+  }
+  if (channels) {
+    map_channels(*midi, *channels);
   }
   return midi;
 }

@@ -8,7 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "app/rooms.h"
+#include "app/session/loader.h"
+#include "app/session/song.h"
 #include "core/result.h"
 
 namespace ressort::commands {
@@ -23,7 +24,7 @@ struct MidiFile {
   };
   std::vector<Message> messages;      // messages of all tracks, sorted by time, then by track
   std::vector<std::uint8_t> bytes;    // bytes of the messages, each with its status byte
-  double beats_per_minute = 120.0;    // at the start
+  TempoMap tempos;
   double length_s = 0.0;              // time of the last event, ends of tracks included
   std::vector<std::string> warnings;  // damage that was read over
 
@@ -44,8 +45,12 @@ Result<MidiFile> parse_midi_file(std::span<const std::uint8_t> file);
 // Appends messages at the end that release all keys and pedals that are still down.
 void release_all(MidiFile& midi);
 
-// Reads and parses a file. Errors have its name.
-Result<MidiFile> read_midi_file(const std::string& path);
+// Moves messages to other channels, or leaves them out.
+void map_channels(MidiFile& midi, const KeyOptions::SongChannels& channels);
+
+// Reads and parses a file, and maps its channels. Errors have its name.
+Result<MidiFile> read_midi_file(const std::string& path,
+                                const std::optional<KeyOptions::SongChannels>& channels = {});
 
 // Returns whether a name ends in .mid, .midi or .rmi, in upper or lower case.
 bool is_midi_file_name(std::string_view path);

@@ -220,10 +220,11 @@ void answer::learn(const Query& query) {
 void answer::unlearn(const Query& query) {
   if (const auto* const target = only_text(query, "TARGET")) {
     const bool waits = query.session.waiting_target() == *target;
-    const bool had = query.session.unlearn(*target) > 0 || waits;
-    answer_named(
-        query, *target,
-        had ? Result<Done>(Done{}) : Error{"no controller is assigned to '" + *target + "'"});
+    auto count = query.session.unlearn(*target);
+    if (count && *count == 0 && !waits) {
+      count = Error{"no controller is assigned to '" + *target + "'"};
+    }
+    answer_named(query, *target, count);
   }
 }
 

@@ -4,6 +4,7 @@
 #include <charconv>
 
 #include "core/midi_number.h"
+#include "core/model/preset/edit.h"
 #include "core/model/preset/toml_table.h"
 
 namespace ressort::model {
@@ -16,7 +17,7 @@ constexpr PresetKey mapping_keys[] = {
     {"controller", "mode", "`absolute`, `twos-complement`, `offset` or `sign-magnitude` (`absolute`)", "the last three are encoders, which send steps: a step up is 1, 65 or 1, a step down 127, 63 or 65. A step is 1/127 of the range"},
     {"controller", "bits", "7 or 14 (7; of an NRPN 14)", "14: `cc0` to `cc31` together with the controller 32 above it, or CC 6 and 38 of an NRPN"},
     {"controller", "pickup", "true or false (false)", "the knob acts once it has met or crossed the present value"},
-    {"controller", "send", "true or false (false)", "the present value is sent to the port `midi_out` (JACK), for motor faders and rings of lights"},
+    {"controller", "send", "true or false (false)", "the present value is sent to the port `midi_out`, for motor faders and rings of lights"},
     {"controller", "channel", "1 to 16 (all)", "the MIDI channel to receive; `send` uses it, or channel 1"},
 };
 // clang-format on
@@ -182,7 +183,54 @@ class MappingReader {
   ParsedControllers& read_;
 };
 
+std::string source_text(const ControllerInput& input) {
+  const auto* const row =
+      std::find_if(std::begin(source_words), std::end(source_words),
+                   [&](const SourceWord& known) { return known.source == input.source; });
+  return std::string(row->word) + (input.source == ControllerSource::controller ? "" : " ") +
+         std::to_string(input.number);
+}
+
+std::string print_row(const ControllerSetting& setting) {
+  const ControllerInput& input = setting.input;
+  std::string text = "[[controller]]\nfrom = " + in_quotes(source_text(input)) +
+                     "\nto = " + in_quotes(setting.target) + "\n";
+  const bool is_relative = input.mode != ControllerMode::absolute;
+  text += is_relative ? "mode = " + in_quotes(name_of(input.mode)) + "\n" : "";
+  if (input.has_14_bits != (input.source == ControllerSource::nrpn && !is_relative)) {
+    text += input.has_14_bits ? "bits = 14\n" : "bits = 7\n";
+  }
+  text += input.picks_up ? "pickup = true\n" : "";
+  text += input.sends ? "send = true\n" : "";
+  if (input.channel != ControllerInput::any_channel) {
+    text += "channel = " + std::to_string(input.channel + 1) + "\n";
+  }
+  return text;
+}
+
+// Returns the comment of a line of TOML, from its '#' on.
+std::string_view comment_of(std::string_view line) {
+  char quote = 0;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    if (quote == 0 && line[i] == '#') {
+      return line.substr(i);
+    }
+    if (quote == '"' && line[i] == '\\') {
+      ++i;
+    } else if (line[i] == quote) {
+      quote = 0;
+    } else if (quote == 0 && (line[i] == '"' || line[i] == '\'')) {
+      quote = line[i];
+    }
+  }
+  return {};
+}
+
 }  // namespace
+
+bool ControllerSetting::replaces(const ControllerSetting& other) const {
+  return input.is_same_source(other.input) || word_of(target) == word_of(other.target);
+}
 
 bool is_action(std::string_view target) {
   return target == "next" || target == "previous" || target == "panic" ||
@@ -194,14 +242,15 @@ int controller_number(std::string_view target) {
 }
 
 std::string name_of(const ControllerInput& input) {
-  const auto* const row =
-      std::find_if(std::begin(source_words), std::end(source_words),
-                   [&](const SourceWord& known) { return known.source == input.source; });
-  return std::string(row->word) + (input.source == ControllerSource::controller ? "" : " ") +
-         std::to_string(input.number) +
-         (input.channel == ControllerInput::any_channel
-              ? ""
-              : " on channel " + std::to_string(input.channel + 1));
+  return source_text(input) + (input.channel == ControllerInput::any_channel
+                                   ? ""
+                                   : " on channel " + std::to_string(input.channel + 1));
+}
+
+std::string_view name_of(ControllerMode mode) {
+  return std::find_if(std::begin(mode_words), std::end(mode_words),
+                      [&](const ModeWord& row) { return row.mode == mode; })
+      ->word;
 }
 
 std::span<const PresetKey> controller_keys() {
@@ -230,6 +279,53 @@ ParsedControllers parse_controllers(std::string_view text) {
     }
   }
   return read;
+}
+
+Result<std::string> edit_controllers(
+    std::string_view text, const std::function<bool(const ControllerSetting&)>& is_dropped,
+    const std::optional<ControllerSetting>& added) {
+  const ParsedControllers before = parse_controllers(text);
+  if (!before.ok()) {
+    return before.errors.front();
+  }
+  std::string block = added ? print_row(*added) : "";
+  std::vector<ControllerSetting> wanted;
+  std::string edited;
+  std::size_t row = 0;  // rows whose headers were read
+  bool drops = false;   // the current row
+  for (std::string_view rest = text; !rest.empty();) {
+    const std::size_t end = std::min(rest.find('\n'), rest.size() - 1) + 1;
+    const std::string_view line = rest.substr(0, end);
+    rest.remove_prefix(end);
+    const std::size_t first = std::min(line.find_first_not_of(" \t\r\n"), line.size());
+    const bool is_head = line.substr(first).starts_with("[[");
+    if (is_head && row < before.rows.size()) {
+      drops = is_dropped(before.rows[row]);
+      if (!drops) {
+        wanted.push_back(before.rows[row]);
+      } else if (edited.ends_with("\n\n") && block.empty()) {
+        edited.pop_back();
+      }
+      ++row;
+    }
+    edited += !drops || first == line.size() ? line : comment_of(line);
+    if (is_head && drops && !block.empty()) {
+      edited += std::exchange(block, "");
+      wanted.push_back(*added);
+    }
+  }
+  if (!block.empty()) {
+    edited += (edited.empty() || edited.ends_with('\n') ? "" : "\n");
+    edited += (edited.empty() ? "" : "\n") + block;
+    wanted.push_back(*added);
+  }
+  const ParsedControllers after = parse_controllers(edited);
+  if (!after.ok()) {
+    return Error{after.errors.front().message};
+  }
+  return after.rows == wanted
+             ? Result<std::string>(std::move(edited))
+             : Error{"write each row as a table [[controller]] with lines of its own"};
 }
 
 }  // namespace ressort::model

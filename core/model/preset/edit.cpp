@@ -26,8 +26,6 @@ std::string source_name(const ControlSetting& control) {
   return "";
 }
 
-namespace {
-
 std::string in_quotes(std::string_view text) {
   std::string quoted = "\"";
   for (const char c : text) {
@@ -35,6 +33,8 @@ std::string in_quotes(std::string_view text) {
   }
   return quoted + "\"";
 }
+
+namespace {
 
 // Prints a number that TOML does not read as an integer.
 std::string in_toml(double number) {
@@ -112,16 +112,6 @@ class Editor {
     edits_.push_back({line_start(node.source().begin.line + 1), 0, lines});
   }
 
-  // Removes the lines from a table's header to the next header.
-  void remove_table(const toml::node& table) {
-    std::size_t line = table.source().begin.line;
-    const std::size_t first = line_start(line);
-    do {
-      ++line;
-    } while (line <= starts_.size() && !is_head(line));
-    edits_.push_back({first, line_start(line) - first, ""});
-  }
-
   std::string result() {
     std::stable_sort(edits_.begin(), edits_.end(),
                      [](const Edit& a, const Edit& b) { return a.first < b.first; });
@@ -144,10 +134,6 @@ class Editor {
   std::size_t line_start(std::size_t line) const {
     return line <= starts_.size() ? starts_[line - 1] : text_.size();
   }
-  bool is_head(std::size_t line) const {
-    const std::size_t first = text_.find_first_not_of(" \t", line_start(line));
-    return first != text_.npos && text_[first] == '[';
-  }
   // Converts a position to an offset. Columns count UTF-8 characters, not bytes.
   std::size_t offset(const toml::source_position& position) const {
     std::size_t at = line_start(position.line);
@@ -163,16 +149,6 @@ class Editor {
   std::vector<std::size_t> starts_;  // offsets of lines
   std::vector<Edit> edits_;
 };
-
-// Returns true if a learned control replaces this row.
-bool is_replaced(const toml::node& row, const std::vector<ControlSetting>& learned) {
-  const auto from =
-      row.as_table() != nullptr ? row.as_table()->get_as<std::string>("from") : nullptr;
-  return from != nullptr &&
-         std::any_of(learned.begin(), learned.end(), [&](const ControlSetting& control) {
-           return from->get() == source_name(control);
-         });
-}
 
 std::string edit(std::string_view text, const PresetChanges& changes) {
   const toml::parse_result parsed = toml::parse(text);
@@ -214,16 +190,6 @@ std::string edit(std::string_view text, const PresetChanges& changes) {
     editor.insert_after(*parameters, more);
   } else if (!more.empty()) {
     end += "\n[parameters]\n" + more;
-  }
-  if (const toml::array* const controls = root.get_as<toml::array>("control")) {
-    for (const toml::node& row : *controls) {
-      if (is_replaced(row, changes.learned)) {
-        editor.remove_table(row);
-      }
-    }
-  }
-  for (const ControlSetting& control : changes.learned) {
-    end += print_control(control);
   }
   std::string result = editor.result();
   result += result.ends_with('\n') || end.empty() ? "" : "\n";

@@ -15,7 +15,6 @@ struct PresetChanges {
   std::string model;  // name or path of the model, relative to the new file
   double gain = 1.0;
   std::vector<ParameterSetting> parameters;  // changed or new
-  std::vector<ControlSetting> learned;       // each replaces all controls of its controller
   std::vector<std::string> through = {};  // the models of `through`, as `model`; empty: unchanged
 };
 
@@ -25,6 +24,9 @@ Result<std::string> edit_preset(std::string_view toml, const PresetChanges& chan
 
 // Prints a preset made by default_preset(). [any thread but audio]
 std::string print_preset(const Preset& preset);
+
+// Returns a text as a string of TOML.
+std::string in_quotes(std::string_view text);
 
 // Returns the source of a control as in a preset: "note", "cc71", "/finger".
 std::string source_name(const ControlSetting& control);

@@ -75,10 +75,31 @@ TEST_CASE("Running status, a tempo change and long times are parsed", "[midi_fil
   check(midi, 4, 2.75, {0xc3, 7});
   check(midi, 5, 2.75, {0x83, 62, 64});  // the file leaves this key down
   CHECK(std::fabs(midi.length_s - 2.75) < 1e-12);
-  CHECK(midi.beats_per_minute == 120.0);
+  CHECK(midi.tempos.beats_per_minute_at(0.0) == 120.0);
+  // A beat of 96 ticks lasts half a second up to the tempo after half a beat, then a second.
+  CHECK(midi.tempos.beats_per_minute_at(0.24) == 120.0);
+  CHECK(midi.tempos.beats_per_minute_at(0.26) == Approx(60.0));
+  CHECK(midi.tempos.time_of(0.25) == Approx(0.125));
+  CHECK(midi.tempos.time_of(3.0) == Approx(2.75));
   const MidiFile slow = read(
       header(0, 1, 96) + track(Bytes{0, 0xff, 0x51, 3, 0x0f, 0x42, 0x40, 0, 0x93, 60, 100} + end));
-  CHECK(slow.beats_per_minute == Approx(60.0));
+  CHECK(slow.tempos.beats_per_minute_at(0.0) == Approx(60.0));
+}
+
+TEST_CASE("channels play on others or are left out", "[midi_file]") {
+  MidiFile midi = read(header(0, 1, 96) +
+                       track(Bytes{0, 0x92, 60, 100, 0, 0x90, 61, 100, 0, 0xf0, 2,  1, 0xf7,  //
+                                   0, 0xe2, 0,  70,  0, 0x82, 60, 0,   0, 0x80, 61, 0} +
+                             end));
+  KeyOptions::SongChannels channels;
+  channels.fill(-1);
+  channels[2] = 9;
+  map_channels(midi, channels);
+  REQUIRE(midi.messages.size() == 4);
+  check(midi, 0, 0.0, {0x99, 60, 100});
+  check(midi, 1, 0.0, {0xf0, 1, 0xf7});
+  check(midi, 2, 0.0, {0xe9, 0, 70});
+  check(midi, 3, 0.0, {0x89, 60, 0});
 }
 
 TEST_CASE("Tracks of type 1 play together, with the tempo of any track", "[midi_file]") {

@@ -31,7 +31,7 @@ struct Stage {
   explicit Stage(std::array<double, 3> times_s)
       : player(begun(harness.session.song(), three_notes(times_s)), door, harness.session.song()) {}
   static MidiFile begun(Song& song, MidiFile file) {
-    song.begin(file.length_s, 120.0, false);
+    song.begin(file.length_s, {}, false);
     return file;
   }
 
@@ -94,16 +94,63 @@ TEST_CASE("a song's position follows its tempo", "[song]") {
 TEST_CASE("a song follows a clock", "[song]") {
   Stage stage({0.0, 100.0, 200.0});
   Song& song = stage.harness.session.song();
-  song.clock(150.0);
+  const ClockReading reading{.rate_hz = 48000.0};
+  Meters none;
+  Meters faster;
+  faster.tempo = 150.0;
+  song.clock(faster, reading);
   CHECK(song.state().tempo == 1.0);
   CHECK(has(stage.harness.say("song tempo clock"), "by the clock"));
-  song.clock(0.0);  // There is none.
+  song.clock(none, reading);
   CHECK(song.state().tempo == 1.0);
-  song.clock(150.0);
+  song.clock(faster, reading);
   CHECK(song.state().tempo == Approx(1.25).epsilon(1e-12));
   stage.harness.say("song tempo 80");
-  song.clock(150.0);
+  song.clock(faster, reading);
   CHECK(song.state().tempo == Approx(0.8).epsilon(1e-12));
+}
+
+// The clock starts in beat 6. By a file that has four beats of half a second and then beats of a
+// second, that is at 4 s. What is due there must be sent a period of 480 frames before.
+TEST_CASE("a song starts, jumps and stops with a clock", "[song]") {
+  Song song;
+  song.begin(100.0, {{{0.0, 0.0, 120.0}, {4.0, 2.0, 60.0}}}, true);
+  REQUIRE(song.follow_clock());
+  const ClockReading reading{
+      .frame = 9600, .time_ns = 5'000'000'000, .rate_hz = 48000.0, .period = 480};
+  Meters now;
+  now.tempo = 60.0;
+  now.song = {.rolls = false, .in_beats = true, .position = 50.0, .jumps = 7};
+  song.clock(now, reading);  // a stop before anyone followed
+  CHECK(song.state().at_s == 0.0);
+  const std::uint64_t jumps = song.state().jumps;
+  now.song = {.rolls = true, .in_beats = true, .position = 6.0, .frame = 9600, .jumps = 8};
+  song.clock(now, reading);
+  const Song::State started = song.state();
+  CHECK(started.plays);
+  CHECK(started.jumps == jumps + 1);
+  CHECK(started.at_s == Approx(4.0).epsilon(1e-12));
+  CHECK(started.at.time_since_epoch() == std::chrono::milliseconds(4990));
+  CHECK(started.tempo == Approx(1.0).epsilon(1e-12));
+  // A tick that is 20 ms late corrects the position without a jump, one in time changes nothing.
+  now.song.position = 7.0;
+  now.song.frame = 9600 + 48000 + 960;
+  song.clock(now, reading);
+  CHECK(song.state().jumps == started.jumps);
+  CHECK(song.state().time_of(6.0) - started.time_of(6.0) == std::chrono::milliseconds(20));
+  const std::uint64_t changes = song.state().changes;
+  now.song.position = 8.0;
+  now.song.frame += 48000;
+  song.clock(now, reading);
+  CHECK(song.state().changes == changes);
+  // A command of the player ends the lead of the clock until it starts again.
+  REQUIRE(song.play(50.0));
+  song.clock(now, reading);
+  CHECK(song.state().at_s == Approx(50.0));
+  now.song = {.rolls = false, .in_beats = false, .position = 12.5, .frame = 9600, .jumps = 9};
+  song.clock(now, reading);
+  CHECK_FALSE(song.state().plays);
+  CHECK(song.state().at_s == 12.5);
 }
 
 TEST_CASE("a wrong command of a song is an error", "[song]") {

@@ -175,14 +175,15 @@ TEST_CASE("status and describe reply in full", "[osc]") {
   CHECK(rows.back().address == "/describe.end");
   CHECK(std::get<std::int32_t>(rows.back().values.at(0)) == static_cast<int>(rows.size()) - 1);
   rows.pop_back();
-  CHECK(rows.size() == addresses().size() + 2);
+  CHECK(rows.size() == addresses().size() + 4);  // two parameters, which are controls too
   CHECK(has(rows[0], "/describe.reply", "/note/on", "note"));
   // Its value, range and stable range are numbers.
-  const Answer& parameter = rows.back();
+  const Answer& parameter = rows[rows.size() - 3];
   CHECK(parameter.text(0) == "/param/m_Z");
   CHECK(parameter.text(1) == "f");
   REQUIRE(parameter.values.size() == 8);
   CHECK(std::get<float>(parameter.values[3]) == 0.2f);
+  CHECK(rows.back().text(0) == "/control/m_Z");
 }
 
 TEST_CASE("every figure has a name, a meaning and at most one place in the reply", "[osc]") {

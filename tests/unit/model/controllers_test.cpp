@@ -83,4 +83,47 @@ TEST_CASE("every error of a mapping has its line, column and advice", "[controll
   }
 }
 
+TEST_CASE("a learned row takes the place of others, and all comments stay", "[controllers]") {
+  const std::string text =
+      "# my desk\n\n[[controller]]  # an encoder\nfrom = \"cc20\"\nto = \"m_K\"  # \\ stiff\n\n"
+      "# the pad\n[[controller]]\nfrom = \"note 36\"\nto = \"load A#1\"\n";
+  const ControllerSetting learned{
+      {.source = ControllerSource::nrpn, .number = 300, .channel = 4, .picks_up = true}, "m_K"};
+  const auto replaced = edit_controllers(
+      text, [&](const auto& row) { return learned.replaces(row); }, learned);
+  REQUIRE(replaced);
+  CHECK(*replaced ==
+        "# my desk\n\n# an encoder\n[[controller]]\nfrom = \"nrpn 300\"\nto = \"m_K\"\n"
+        "bits = 7\npickup = true\nchannel = 5\n# \\ stiff\n\n"
+        "# the pad\n[[controller]]\nfrom = \"note 36\"\nto = \"load A#1\"\n");
+  const auto none = [](const auto&) { return false; };
+  const auto same = [](const ControllerSetting& row) {
+    return [row](const ControllerSetting& other) { return other == row; };
+  };
+  // What is added to any text is read as it was, and goes without a trace.
+  using enum ControllerMode;
+  for (const std::string& before : {std::string(), text, std::string("# no end of the line")}) {
+    for (const ControllerInput& input :
+         {ControllerInput{.number = 7, .channel = 0, .sends = true},
+          ControllerInput{.number = 21, .has_14_bits = true},
+          ControllerInput{.source = ControllerSource::nrpn, .number = 16383, .has_14_bits = true},
+          ControllerInput{.source = ControllerSource::nrpn, .mode = offset},
+          ControllerInput{.number = 22, .mode = twos_complement},
+          ControllerInput{.number = 23, .mode = sign_magnitude}}) {
+      const ControllerSetting setting{input, "bow \"pressure\""};
+      const auto added = edit_controllers(before, none, setting);
+      REQUIRE(added);
+      const auto read = parse_controllers(*added);
+      REQUIRE(read.ok());
+      CHECK(read.rows.back() == setting);
+      const auto gone = edit_controllers(*added, same(setting), std::nullopt);
+      REQUIRE(gone);
+      CHECK((*gone == before || *gone == before + "\n"));
+    }
+  }
+  CHECK_FALSE(edit_controllers("controller = [{ from = \"cc20\", to = \"m_K\" }]",
+                               same({{.number = 20}, "m_K"}), std::nullopt));
+  CHECK_FALSE(edit_controllers("controllers = 1", none, learned));
+}
+
 }  // namespace ressort::controllers_test

@@ -87,23 +87,6 @@ TEST_CASE("models of 'through' are renamed one by one", "[preset_edit]") {
   CHECK(*moved == replaced(two, "b.mdl", "/x/b.mdl"));
 }
 
-TEST_CASE("a learned control replaces the controls of its controller", "[preset_edit]") {
-  const ControlSetting learned{.source = ControlSource::controller,
-                               .number = 1,
-                               .target = "Z\u00fc",
-                               .gesture = Gesture::parameter,
-                               .low = 0.25,
-                               .high = 1.0,
-                               .exponential = true};
-  const auto parsed = parse_preset(edited({.model = "a.mdl", .gain = 2.0, .learned = {learned}}));
-  REQUIRE(parsed.ok());
-  REQUIRE(parsed.preset.controls.size() == 2);
-  CHECK(parsed.preset.controls[0].source == ControlSource::note);
-  ControlSetting read = parsed.preset.controls[1];
-  read.location = learned.location;
-  CHECK(read == learned);
-}
-
 TEST_CASE("a missing gain is added, and a text that is not a preset is rejected", "[preset_edit]") {
   const auto short_one = edit_preset("model = \"a.mdl\"", {.model = "a.mdl", .gain = 0.5});
   REQUIRE(short_one);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "app/realtime/midi_chart.h"
+#include "app/realtime/song_clock.h"
 #include "core/engine/midi/channels.h"
 #include "tests/support/harness.h"
 
@@ -93,11 +94,19 @@ TEST_CASE("running status works within a packet and across packets", "[midi]") {
 
 TEST_CASE("real-time bytes may appear anywhere", "[midi]") {
   MidiReader reader;
-  const auto events = read(reader, {0xf8, 0x90, 0xfe, 60, 0xf8, 0xff, 100, 0xfa});
-  REQUIRE(events.size() == 3);
+  const auto events = read(reader, {0xf8, 0x90, 0xfe, 60, 0xf8, 0xff, 100, 0xfa, 0xfb, 0xfc, 0xfd});
+  REQUIRE(events.size() == 6);
   check_event(events[0], EventKind::clock, 0, 0, 0.0);
   check_event(events[1], EventKind::clock, 0, 0, 0.0);
   check_event(events[2], EventKind::note_on, 0, 60, 100 / 127.0);
+  for (const ClockMessage message :
+       {ClockMessage::start, ClockMessage::resume, ClockMessage::stop}) {
+    const auto index = static_cast<std::uint16_t>(message);
+    check_event(events[2 + index], EventKind::clock, 0, index, 0.0);
+  }
+  // A song position is a number of sixteenth notes with 14 bits, the low half first.
+  check_event(read(reader, {0xf2, 5, 3}).at(0), EventKind::clock, 0,
+              static_cast<std::uint16_t>(ClockMessage::song_position), 389.0);
   CHECK(reader.malformed() == 0);
 }
 
@@ -289,7 +298,7 @@ TEST_CASE("random bytes in random packets make only valid events", "[midi]") {
       REQUIRE(event.index <= 127);
       REQUIRE(event.channel <= 15);
       REQUIRE(event.value >= (is_bend ? -1.0 : 0.0));
-      REQUIRE(event.value <= 1.0);
+      REQUIRE(event.value <= (event.kind == EventKind::clock ? 16383.0 : 1.0));
       REQUIRE((event.kind != EventKind::note_on || event.value > 0.0));
     }
   }

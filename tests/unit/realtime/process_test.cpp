@@ -61,10 +61,10 @@ TEST_CASE("a MIDI clock and JACK's transport set the tempo", "[process]") {
   CHECK(play_ticks(48, 918.75, 64.0) == Approx(120.0).epsilon(0.0030));
   harness.run(44100);  // a pause of a second, longer than between two ticks
   CHECK(play_ticks(7, 1837.5, 0.0) == Approx(60.0).epsilon(1e-3));
-  harness.process.set_transport_tempo(1.5);
+  harness.process.set_transport({.beats_per_s = 1.5});
   harness.run(256);
   CHECK(harness.process.meters().tempo == 90.0);
-  harness.process.set_transport_tempo(0.0);  // the transport's master has left
+  harness.process.set_transport({});  // the transport's master has left
   harness.run(256);
   CHECK(harness.process.meters().tempo == 90.0);
   CHECK(harness.heap_calls == 0);
