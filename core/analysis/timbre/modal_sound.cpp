@@ -1,9 +1,9 @@
 #include "core/analysis/timbre/modal_sound.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 namespace ressort::analysis {
@@ -14,136 +14,94 @@ constexpr double gone = 1e-100;  // States below this are set to 0, so that none
 }  // namespace
 
 ModalSound::ModalSound(std::span<const Motion> motions, std::vector<std::vector<double>> pulses)
-    : pulses_(std::move(pulses)) {
-  const std::size_t count = (motions.size() + group - 1) / group * group;
+    : pulses_(std::move(pulses)),
+      real_(motions.size()),
+      imaginary_(motions.size()),
+      pushed_(pulses_.size()) {
+  for (const auto& pulse : pulses_) {
+    pulse_end_ = std::max(pulse_end_, pulse.size());
+  }
   std::vector<const Motion*> order;
   for (const Motion& motion : motions) {
     order.push_back(&motion);
   }
   std::sort(order.begin(), order.end(),
             [](const Motion* a, const Motion* b) { return a->pole.imag() < b->pole.imag(); });
-  for (auto* const numbers : {&turn_real_, &turn_imaginary_, &real_, &imaginary_}) {
-    numbers->resize(count);
-  }
-  pushed_real_.resize(pulses_.size() * count);
-  pushed_imaginary_.resize(pulses_.size() * count);
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    const std::complex<double> turn = std::exp(order[i]->pole);
-    turn_real_[i] = turn.real();
-    turn_imaginary_[i] = turn.imag();
+  const auto add = [](Turns& turns, std::complex<double> number) {
+    turns.real.push_back(number.real());
+    turns.imaginary.push_back(number.imag());
+  };
+  for (const Motion* const motion : order) {
+    add(turns_, std::exp(motion->pole));
     for (std::size_t p = 0; p < pulses_.size(); ++p) {
-      pushed_real_[p * count + i] = order[i]->pushed[p].real();
-      pushed_imaginary_[p * count + i] = order[i]->pushed[p].imag();
+      add(pushed_[p], motion->pushed[p]);
     }
   }
 }
 
-std::size_t ModalSound::pulse_end() const {
-  std::size_t end = 0;
-  for (const auto& pulse : pulses_) {
-    end = std::max(end, pulse.size());
+void ModalSound::turn(const Turns& turns) {
+  const double* const c = turns.real.data();
+  const double* const s = turns.imaginary.data();
+  double* const x = real_.data();
+  double* const y = imaginary_.data();
+  for (std::size_t i = 0; i < real_.size(); ++i) {
+    const double turned = c[i] * x[i] - s[i] * y[i];
+    y[i] = s[i] * x[i] + c[i] * y[i];
+    x[i] = turned;
   }
-  return end;
 }
 
-struct ModalSound::Group {
-  using Numbers = std::array<double, group>;
-  Numbers x{}, y{};  // States.
-  Numbers c{}, s{};  // Rotations per sample.
-  void turn() {
-    for (std::size_t i = 0; i < group; ++i) {
-      const double turned = c[i] * x[i] - s[i] * y[i];
-      y[i] = s[i] * x[i] + c[i] * y[i];
-      x[i] = turned;
+// Adds the pulses of this sample and advances by one.
+void ModalSound::push_and_turn() {
+  for (std::size_t p = 0; p < pulses_.size() && at_ < pulse_end_; ++p) {
+    const double push = at_ < pulses_[p].size() ? pulses_[p][at_] : 0.0;
+    for (std::size_t i = 0; i < real_.size(); ++i) {
+      real_[i] += push * pushed_[p].real[i];
+      imaginary_[i] += push * pushed_[p].imaginary[i];
     }
   }
-  static double sum(const Numbers& numbers) {
-    return (numbers[0] + numbers[1]) + (numbers[2] + numbers[3]);
-  }
-};
-
-ModalSound::Group ModalSound::group_at(std::size_t first) const {
-  Group all;
-  for (std::size_t i = 0; i < group; ++i) {
-    all.x[i] = real_[first + i];
-    all.y[i] = imaginary_[first + i];
-    all.c[i] = turn_real_[first + i];
-    all.s[i] = turn_imaginary_[first + i];
-  }
-  return all;
+  turn(turns_);
+  ++at_;
 }
 
-void ModalSound::keep(const Group& all, std::size_t first) {
-  for (std::size_t i = 0; i < group; ++i) {
-    const bool is_gone = std::fabs(all.x[i]) + std::fabs(all.y[i]) < gone;
-    real_[first + i] = is_gone ? 0.0 : all.x[i];
-    imaginary_[first + i] = is_gone ? 0.0 : all.y[i];
-  }
-}
-
-// Advances one sample and adds the pulses of that sample.
-void ModalSound::push(Group& all, std::size_t first, std::size_t sample) const {
-  for (std::size_t p = 0; p < pulses_.size(); ++p) {
-    const double push = sample < pulses_[p].size() ? pulses_[p][sample] : 0.0;
-    for (std::size_t i = 0; i < group; ++i) {
-      all.x[i] += push * pushed_real_[p * real_.size() + first + i];
-      all.y[i] += push * pushed_imaginary_[p * real_.size() + first + i];
+void ModalSound::clear_faint() {
+  for (std::size_t i = 0; i < real_.size(); ++i) {
+    if (std::fabs(real_[i]) + std::fabs(imaginary_[i]) < gone) {
+      real_[i] = imaginary_[i] = 0.0;
     }
   }
-  all.turn();
 }
 
+// std::reduce adds up groups of four, so that an addition seldom waits for the one before.
 void ModalSound::next(std::span<double> samples) {
-  std::fill(samples.begin(), samples.end(), 0.0);
-  const std::size_t driven = std::min(samples.size(), std::max(pulse_end(), at_) - at_);
-  for (std::size_t first = 0; first < real_.size(); first += group) {
-    Group all = group_at(first);
-    for (std::size_t n = 0; n < samples.size(); ++n) {
-      if (n < driven) {
-        push(all, first, at_ + n);
-      } else {
-        all.turn();
-      }
-      samples[n] += Group::sum(all.y);
-    }
-    keep(all, first);
+  for (double& sample : samples) {
+    push_and_turn();
+    sample = std::reduce(imaginary_.begin(), imaginary_.end());
   }
-  at_ += samples.size();
+  clear_faint();
 }
 
 void ModalSound::next_magnitudes(std::span<double> magnitudes, std::size_t step) {
-  std::vector<double> real(magnitudes.size());
-  std::vector<double> imaginary(magnitudes.size());
-  const std::size_t driven =
-      std::min(magnitudes.size(), (std::max(pulse_end(), at_) - at_ + step - 1) / step);
-  for (std::size_t first = 0; first < real_.size(); first += group) {
-    Group all = group_at(first);
-    Group far = all;
-    for (std::size_t i = 0; i < group; ++i) {
-      const std::complex<double> turn =
-          std::pow(std::complex<double>(all.c[i], all.s[i]), static_cast<double>(step));
-      far.c[i] = turn.real();
-      far.s[i] = turn.imag();
-    }
-    for (std::size_t n = 0; n < magnitudes.size(); ++n) {
-      if (n < driven) {
-        for (std::size_t m = 0; m < step; ++m) {
-          push(all, first, at_ + n * step + m);
-        }
-        far.x = all.x;
-        far.y = all.y;
-      } else {
-        far.turn();
+  Turns far = turns_;
+  for (std::size_t i = 0; i < real_.size(); ++i) {
+    const std::complex<double> turn =
+        std::pow(std::complex<double>(far.real[i], far.imaginary[i]), static_cast<double>(step));
+    far.real[i] = turn.real();
+    far.imaginary[i] = turn.imag();
+  }
+  for (double& magnitude : magnitudes) {
+    if (is_pushed()) {
+      for (std::size_t m = 0; m < step; ++m) {
+        push_and_turn();
       }
-      real[n] += Group::sum(far.x);
-      imaginary[n] += Group::sum(far.y);
+    } else {
+      turn(far);
+      at_ += step;
     }
-    keep(far, first);
+    magnitude = std::hypot(std::reduce(real_.begin(), real_.end()),
+                           std::reduce(imaginary_.begin(), imaginary_.end()));
   }
-  for (std::size_t n = 0; n < magnitudes.size(); ++n) {
-    magnitudes[n] = std::hypot(real[n], imaginary[n]);
-  }
-  at_ += magnitudes.size() * step;
+  clear_faint();
 }
 
 double ModalSound::most_left(double rate_hz, double resolution_s) const {
@@ -152,7 +110,7 @@ double ModalSound::most_left(double rate_hz, double resolution_s) const {
   double together = 0.0;
   double before = 0.0;
   for (std::size_t i = 0; i < real_.size(); ++i) {
-    const double angle = std::atan2(turn_imaginary_[i], turn_real_[i]);
+    const double angle = std::atan2(turns_.imaginary[i], turns_.real[i]);
     if (angle - before > near) {
       energy += together * together;
       together = 0.0;

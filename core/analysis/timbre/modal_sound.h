@@ -27,28 +27,28 @@ class ModalSound {
   // samples. While a pulse lasts, O(step) each.
   void next_magnitudes(std::span<double> magnitudes, std::size_t step);
 
-  bool is_pushed() const { return at_ < pulse_end(); }  // True while a pulse acts.
+  bool is_pushed() const { return at_ < pulse_end_; }  // True while a pulse acts.
 
   // Returns an upper estimate of the future envelope without further pulses, over a time of
   // `resolution_s`: amplitudes of modes that can come into phase add up, others add up as energies.
   double most_left(double rate_hz, double resolution_s) const;
 
  private:
-  static constexpr std::size_t group =
-      4;  // Number of modes stepped side by side, because each sample waits for the one before.
-
-  struct Group;
-  Group group_at(std::size_t first) const;
-  void keep(const Group& group, std::size_t first);
-  void push(Group& all, std::size_t first, std::size_t sample) const;
-  std::size_t pulse_end() const;
+  using Numbers = std::vector<double>;  // [motion]
+  struct Turns {                        // Factors of all states, real and imaginary parts.
+    Numbers real, imaginary;
+  };
+  void turn(const Turns& turns);
+  void push_and_turn();
+  void clear_faint();
 
   std::vector<std::vector<double>> pulses_;
+  std::size_t pulse_end_ = 0;
   std::size_t at_ = 0;
-  // [motion] Sorted by frequency, padded to whole groups.
-  std::vector<double> turn_real_, turn_imaginary_;
-  std::vector<double> real_, imaginary_;
-  std::vector<double> pushed_real_, pushed_imaginary_;  // [pulse * motions + motion]
+  // Sorted by frequency.
+  Turns turns_;  // Per sample.
+  Numbers real_, imaginary_;
+  std::vector<Turns> pushed_;  // [pulse]
 };
 
 }  // namespace ressort::analysis

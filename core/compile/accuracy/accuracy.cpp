@@ -5,8 +5,6 @@
 #include <numbers>
 
 #include "core/compile/accuracy/springs.h"
-#include "core/compile/accuracy/steepness.h"
-#include "core/compile/accuracy/stepping.h"
 #include "core/linear_algebra/eigen.h"
 
 namespace ressort::compile {
@@ -20,6 +18,7 @@ constexpr double highest_hz = 20'000.0;
 constexpr double longest_s = 3600.0;
 constexpr double most_work = 1.5e10;  // multiplications for eigenvalues: some seconds
 constexpr std::size_t most_bounded_steps = 400;
+constexpr double damping_weight = 6.0;  // of Z beside K, in the ranking of corners
 
 Accuracy unknown() {
   return {.is_known = false};
@@ -154,7 +153,7 @@ std::vector<Corner> corners_of(const Program& program, std::span<const double> s
     if (program.depending[i].empty()) {
       continue;
     }
-    double most = steepness_of(program, stiffest).both;
+    double most = steepness_of(program, stiffest, damping_weight);
     for (const double end : {lowest[i], highest[i]}) {
       std::vector<double> turned = start;
       turned[i] = end;
@@ -163,7 +162,7 @@ std::vector<Corner> corners_of(const Program& program, std::span<const double> s
       }
       std::vector<double> candidate = stiffest;
       candidate[i] = end;
-      if (const double both = steepness_of(program, candidate).both; both > most) {
+      if (const double both = steepness_of(program, candidate, damping_weight); both > most) {
         most = both;
         stiffest = std::move(candidate);
       }
@@ -202,7 +201,7 @@ Accuracy AccuracyMeter::of(const Form& form) {
 
 Poles AccuracyMeter::Continuous::all_poles() const {
   Poles all = poles;
-  for (const Mode& mode : modes) {
+  for (const SpringMode& mode : modes) {
     if (const auto pole = continuous_pole(mode.stiffness, mode.damping)) {
       all.push_back(*pole);
     }
@@ -227,10 +226,8 @@ const AccuracyMeter::Continuous& AccuracyMeter::continuous_at(std::size_t corner
     continuous.is_known = false;
     return continuous;
   }
-  if (const auto modes = modes_of(springs)) {
-    for (const auto& [stiffness, damping] : *modes) {
-      continuous.modes.push_back({stiffness, damping});
-    }
+  if (auto modes = modes_of(springs)) {
+    continuous.modes = *std::move(modes);
     return continuous;
   }
   continuous.is_proportional = false;
@@ -247,9 +244,9 @@ const AccuracyMeter::Continuous& AccuracyMeter::continuous_at(std::size_t corner
 Accuracy AccuracyMeter::at(std::size_t corner, const Stepping& stepping) {
   const Program& program = program_;
   const double rate_hz = program.rate_hz;
-  const auto compare_modes = [&](const auto& modes) {
+  const auto compare_modes = [&](const std::vector<SpringMode>& modes) {
     Accuracy worst;
-    for (const auto& mode : modes) {
+    for (const SpringMode& mode : modes) {
       const auto wanted = continuous_pole(mode.stiffness, mode.damping);
       if (wanted && is_heard(*wanted, rate_hz)) {
         const auto found = stepping.pole(mode.stiffness, mode.damping);
@@ -271,9 +268,8 @@ Accuracy AccuracyMeter::at(std::size_t corner, const Stepping& stepping) {
     if (!proportion) {
       return unknown();
     }
-    const double most =
-        numbers.stiffness_factor * steepness_of(program, numbers.parameters).stiffness;
-    std::vector<Mode> modes;
+    const double most = numbers.stiffness_factor * steepness_of(program, numbers.parameters, 0.0);
+    std::vector<SpringMode> modes;
     for (std::size_t i = 0; i < most_bounded_steps; ++i) {
       const double k = most * std::pow(10.0, -6.0 * static_cast<double>(i) / most_bounded_steps);
       modes.push_back({k, proportion->by_mass + proportion->by_stiffness * k});

@@ -68,15 +68,11 @@ class AccuracyMeter {
   Accuracy of(const Form& form);
 
  private:
-  struct Mode {
-    double stiffness = 0.0;
-    double damping = 0.0;
-  };
   // The continuous network at one corner.
   struct Continuous {
     bool is_known = true;
     bool is_proportional = true;
-    std::vector<Mode> modes;                  // modes, with proportional damping
+    std::vector<SpringMode> modes;            // modes, with proportional damping
     std::vector<std::complex<double>> poles;  // otherwise, of oscillating modes
     std::vector<std::complex<double>> all_poles() const;
   };

@@ -38,14 +38,12 @@ Vector roots_of(const Program& program, const std::vector<double>& value) {
   return root;
 }
 
-}  // namespace
-
-std::vector<SpringDamper> spring_dampers_of(const Program& program,
-                                            const std::vector<double>& value) {
-  std::vector<SpringDamper> found;
+// Calls use(spring) for every oscillator and every link that is or contains a spring.
+template <class Use>
+void each_spring(const Program& program, const std::vector<double>& value, Use&& use) {
   for (const MassRun& run : program.mass_runs) {
     for (std::uint32_t i = run.first; run.is_oscillator && i < run.first + run.count; ++i) {
-      found.push_back({.shares = {{i, 1.0}},
+      use(SpringDamper{.shares = {{i, 1.0}},
                        .stiffness = value[run.stiffness],
                        .damping = value[run.damping],
                        .is_own = true});
@@ -60,29 +58,36 @@ std::vector<SpringDamper> spring_dampers_of(const Program& program,
     if (!law.contains_spring) {
       continue;
     }
-    for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
-      SpringDamper& one = found.emplace_back(
-          SpringDamper{.stiffness = value[run.coefficients[law.slot(Role::stiffness)]],
-                       .damping = value[run.coefficients[law.slot(Role::damping)]],
-                       .scheme = run.scheme});
-      const auto hang = [&](std::uint32_t node, double sign) {
-        if (!is_place(program, node)) {
-          if (node < program.moving) {
-            one.shares.emplace_back(node, sign);
-          }
-          return;
+    SpringDamper one{.stiffness = value[run.coefficients[law.slot(Role::stiffness)]],
+                     .damping = value[run.coefficients[law.slot(Role::damping)]],
+                     .scheme = run.scheme};
+    const auto hang = [&](std::uint32_t node, double sign) {
+      const auto add = [&](std::uint32_t at, double weight) {
+        if (at < program.moving && weight != 0.0) {
+          one.shares.emplace_back(at, sign * weight);
         }
-        const std::size_t tap = node - program.taps[0].node;
-        each_behind(program, program.taps[tap], corners[tap], [&](std::uint32_t at, double weight) {
-          if (at < program.moving && weight != 0.0) {
-            one.shares.emplace_back(at, sign * weight);
-          }
-        });
       };
+      if (!is_place(program, node)) {
+        return add(node, 1.0);
+      }
+      const std::size_t tap = node - program.taps[0].node;
+      each_behind(program, program.taps[tap], corners[tap], add);
+    };
+    for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
+      one.shares.clear();
       hang(program.ends[i].a, 1.0);
       hang(program.ends[i].b, -1.0);
+      use(one);
     }
   }
+}
+
+}  // namespace
+
+std::vector<SpringDamper> spring_dampers_of(const Program& program,
+                                            const std::vector<double>& value) {
+  std::vector<SpringDamper> found;
+  each_spring(program, value, [&](const SpringDamper& one) { found.push_back(one); });
   return found;
 }
 
@@ -92,7 +97,7 @@ Springs springs_of(const Program& program, std::span<const double> parameters,
   Springs springs{Matrix(n, n), Matrix(n, n)};
   const std::vector<double> value = values_of(program, parameters, stiffness_factor, is_sampled);
   const Vector root = roots_of(program, value);
-  for (const SpringDamper& one : spring_dampers_of(program, value)) {
+  each_spring(program, value, [&](const SpringDamper& one) {
     for (const auto& [i, a] : one.shares) {
       for (const auto& [j, b] : one.shares) {
         const double share = a * b * root[i] * root[j];
@@ -100,12 +105,37 @@ Springs springs_of(const Program& program, std::span<const double> parameters,
         springs.damping(i, j) += share * one.damping;
       }
     }
-  }
+  });
   springs.is_sound = std::all_of(std::begin(root), std::end(root),
                                  [](double r) { return r > 0.0 && std::isfinite(r); }) &&
                      std::isfinite(springs.stiffness.values.sum()) &&
                      std::isfinite(springs.damping.values.sum());
   return springs;
+}
+
+double steepness_of(const Program& program, std::span<const double> parameters, double by_damping) {
+  const std::vector<double> value = values_of(program, parameters, 1.0);
+  const auto weight_of = [&](const SpringDamper& one) {
+    return std::max(0.0, one.stiffness) + by_damping * std::max(0.0, one.damping);
+  };
+  Vector sum(program.moving);
+  each_spring(program, value, [&](const SpringDamper& one) {
+    for (const auto& [node, share] : one.shares) {
+      sum[node] += std::fabs(share) * weight_of(one);
+    }
+  });
+  for (const MassRun& run : program.mass_runs) {
+    sum[std::slice(run.first, run.count, 1)] *= Vector(value[run.inverse_mass], run.count);
+  }
+  double bound = 0.0;
+  each_spring(program, value, [&](const SpringDamper& one) {
+    double both = 0.0;
+    for (const auto& [node, share] : one.shares) {
+      both += std::fabs(share) * sum[node];
+    }
+    bound = weight_of(one) > 0.0 ? std::max(bound, both) : bound;
+  });
+  return bound;
 }
 
 bool has_linear_springs(const Program& program) {
@@ -119,7 +149,7 @@ bool contains_bent_springs(const Program& program) {
   });
 }
 
-std::optional<std::vector<std::pair<double, double>>> modes_of(const Springs& springs) {
+std::optional<std::vector<SpringMode>> modes_of(const Springs& springs) {
   const double most_k = std::max(largest(springs.stiffness.values), 1e-300);
   const double most_z = std::max(largest(springs.damping.values), 1e-300);
   // Eigenvectors of a mixture of K and Z in an irrational ratio: it separates modes of equal
@@ -130,7 +160,7 @@ std::optional<std::vector<std::pair<double, double>>> modes_of(const Springs& sp
   const Matrix shapes = symmetric_eigenpairs(mixture).vectors;
   const Matrix k = in_basis(springs.stiffness, shapes);
   const Matrix z = in_basis(springs.damping, shapes);
-  std::vector<std::pair<double, double>> modes;
+  std::vector<SpringMode> modes;
   for (std::size_t j = 0; j < k.columns(); ++j) {
     for (std::size_t i = 0; i < k.rows(); ++i) {
       if (i != j && !(std::fabs(k(i, j)) <= diagonal_tolerance * most_k &&
@@ -138,8 +168,8 @@ std::optional<std::vector<std::pair<double, double>>> modes_of(const Springs& sp
         return std::nullopt;
       }
     }
-    modes.emplace_back(k(j, j) < zero_tolerance * most_k ? 0.0 : k(j, j),
-                       z(j, j) < zero_tolerance * most_z ? 0.0 : z(j, j));
+    modes.push_back({k(j, j) < zero_tolerance * most_k ? 0.0 : k(j, j),
+                     z(j, j) < zero_tolerance * most_z ? 0.0 : z(j, j)});
   }
   return modes;
 }

@@ -38,14 +38,23 @@ struct Springs {
 Springs springs_of(const Program& program, std::span<const double> parameters,
                    double stiffness_factor, bool is_sampled = false);
 
+// Returns an upper bound on (K + by_damping Z)/M of a mode, per sample, by the edge bound: the
+// largest d_a/m_a + d_b/m_b of a link, where d is the sum of K + by_damping Z at a mass. O(links)
+double steepness_of(const Program& program, std::span<const double> parameters, double by_damping);
+
 // Returns whether any link is a spring or contains one.
 bool has_linear_springs(const Program& program);
 // Returns whether a nonlinear link contains a spring.
 bool contains_bent_springs(const Program& program);
 
-// Returns the [mode] stiffness and damping, or nothing if damping is not proportional, that is if Z
+// A mode of a mass of 1, per sample.
+struct SpringMode {
+  double stiffness = 0.0;
+  double damping = 0.0;
+};
+// Returns the modes, or nothing if damping is not proportional, that is if Z
 // is not diagonal in the modes of K to 1e-9 of its largest element. O(masses^3)
-std::optional<std::vector<std::pair<double, double>>> modes_of(const Springs& springs);
+std::optional<std::vector<SpringMode>> modes_of(const Springs& springs);
 
 // Rayleigh damping: Z = by_mass M + by_stiffness K, element by element.
 struct Rayleigh {
