@@ -150,7 +150,8 @@ std::string played_preset(const Identification& found, const std::vector<NoiseBa
       "model = \"" + model + "\"\ndescription = \"" + source + ": " +
       counted(found.modes.size(), "mode", "modes") +
       ". The wheel moves the blow.\"\nvoices = 8\ngain = " + five_digits(wanted_peak / peak) +
-      "\n\n[parameters]\nring = { value = 1, range = [0.5, 2] }\n"
+      "\nhardness = \"mallet\"\n\n[parameters]\nmallet = { value = 0, range = [-0.5, 0.5] }\nring "
+      "= { value = 1, range = [0.5, 2] }\n"
       "damp = { value = 0, range = [0, 20] }\nplace = { value = " +
       place_of(places, 1) + ", range = " + range + " }\n" + strike(1.0, 1) + strike(-1.0, 2);
   for (std::size_t b = 0; b < noise.size(); ++b) {
@@ -161,6 +162,7 @@ std::string played_preset(const Identification& found, const std::vector<NoiseBa
             five_digits(noise[b].high_hz) + "]\n";
   }
   return text + knob("cc1", "place", "Place", range) +
+         knob("cc16", "mallet", "Mallet", "[-0.5, 0.5]") +
          knob("cc71", "ring", "Ring", "[0.5, 2]\ncurve = \"exponential\"") +
          knob("cc74", "damp", "Brightness", "[20, 0]");
 }

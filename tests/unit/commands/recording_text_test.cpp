@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "app/commands/output.h"
 #include "core/identification/shapes.h"
 #include "tests/support/harness.h"
 #include "tests/support/ringing.h"
@@ -103,7 +104,7 @@ TEST_CASE("The preset names its model, its knobs and a burst for each band", "[r
   const std::string text = played_preset(found, noise, "bowl.mdl", "bowl.wav");
   CHECK(text.find("model = \"bowl.mdl\"") == 0);
   for (const char* const knob :
-       {"ring = {", "damp = {", "place = {", "to = \"in2\"\nhow = \"noise\""}) {
+       {"mallet = {", "ring = {", "damp = {", "place = {", "to = \"in2\"\nhow = \"noise\""}) {
     INFO(knob);
     CHECK(text.find(knob) != std::string::npos);
   }
@@ -134,17 +135,39 @@ TEST_CASE("The JSON has the identified modes", "[recording_text]") {
 
 TEST_CASE("The figure has a mark and a bar for each mode", "[recording_text]") {
   const Identification found = identified({ringing(known, 1.0)});
-  const plot::Figure figure = recording_figure(found, "a <b> & c");
+  const plot::Figure figure = recording_figure(found, parts_of(found, {}), "a <b> & c");
   CHECK(figure.title == "a <b> & c: 3 modes");
-  REQUIRE(figure.panels.size() == 3);
+  REQUIRE(figure.panels.size() == 6);
   const auto rows_of = [&](std::size_t panel, std::size_t series) {
     const std::string& data = figure.panels[panel].series[series].data;
     return std::count(data.begin(), data.end(), '\n');
   };
-  CHECK(rows_of(0, 1) == 3);
-  CHECK(rows_of(1, 0) == 3);
-  CHECK(rows_of(1, 1) == 3);
+  CHECK(rows_of(3, 1) == 3);
+  CHECK(rows_of(4, 0) == 3);
+  CHECK(rows_of(4, 1) == 3);
   CHECK(plot::to_script(figure).find("NaN") == std::string::npos);
+}
+
+TEST_CASE("The parts of a recording are written at equal loudness", "[recording_text]") {
+  const Identification found = identified({ringing(known, 1.0)});
+  const std::vector<NoiseBand> noise = {
+      {.low_hz = 1500.0, .high_hz = 5000.0, .t60_s = 1.0, .level = {0.01}}};
+  const auto folder = TemporaryFolder::make();
+  REQUIRE(folder);
+  const std::string path = folder->file("parts");
+  REQUIRE(write_parts(path, parts_of(found, noise), false));
+  CHECK_FALSE(write_parts(path, parts_of(found, noise), false));
+  const auto recording = read_sound(path + "/recording.wav");
+  REQUIRE(recording);
+  double peak = 0.0;
+  for (const char* const name : {"/recording.wav", "/modes.wav", "/noise.wav", "/sum.wav"}) {
+    INFO(name);
+    const auto sound = read_sound(path + name);
+    REQUIRE(sound);
+    CHECK(*loudness_lufs(*sound) == Approx(*loudness_lufs(*recording)).margin(0.1));
+    peak = std::max(peak, peak_of(sound->channels[0]));
+  }
+  CHECK(peak == Approx(0.9).epsilon(1e-6));
 }
 
 }  // namespace ressort::recording_text_test
