@@ -818,7 +818,7 @@ const SamElement* SamTranslator::follower(const SamElement& out, const SamElemen
       return lines_.join(origin, out.statement->word, inertia, '*', factor);
     };
     emit(origin, mass.end + " osc " + inertia + " 0 " + scaled_by_inertia(filter.damping) + " 0 0");
-    emit(origin, mass.end + "_link spring " + mass.end + " " + source.end + " " +
+    emit(origin, unique(mass.end + "_link") + " spring " + mass.end + " " + source.end + " " +
                      scaled_by_inertia(filter.stiffness));
   }
   return &mass;

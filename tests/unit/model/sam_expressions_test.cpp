@@ -231,6 +231,14 @@ TEST_CASE("filters behind an output agree with FAUST's recursions", "[sam_expres
   }
 }
 
+TEST_CASE("the mass of a filter has a name of its own", "[sam_expressions]") {
+  const Network network = network_of(
+      "mass(0.001,0.0,0.0),filter1;\nground(0.0),rim;\n"
+      "link(400.0,0.5,0.0),filter1_link,filter1,rim;\naudioout,a,filter1:smooth(0.9);\n");
+  REQUIRE(network.links.size() == 2);
+  CHECK(network.links[0].name.text() != network.links[1].name.text());
+}
+
 TEST_CASE("a filter that cannot be computed is left out with its reason", "[sam_expressions]") {
   const std::string fourth = drum + "audioout,a,head:lowpass(1,99.0):lowpass(6,99.0);\n";
   CHECK(warnings_of(fourth)[0] ==
