@@ -172,9 +172,9 @@ struct Process {
   Ring<TimedEvent> from_midi{max_now + max_endings};     // written by RtMidi's thread
   Ring<TimedEvent> from_session{max_now + max_endings};  // written by the session's worker
   TripleBuffer<ControllerMap> controllers{
-      ControllerMap{}};        // written by the session, under its lock
-  Ring<Report> reports{4096};  // read by the session's worker
-  Flag hears_controllers;      // reports every controller message, before the mapping
+      ControllerMap{}};                  // written by the session, under its lock
+  Ring<Report> reports{4096};            // read by the session's worker
+  Flag hears_controllers;                // reports every controller message, before the mapping
   Ring<MidiBytes> to_controllers{1024};  // messages to controllers, for RtMidi
   Flag has_midi_out;                     // somebody reads them
   Ring<RecordedChunk> recording{8192};

@@ -39,7 +39,7 @@ struct Loaded {
 struct MappedRow {
   ControllerSetting setting;
   bool is_learned = false;  // since the start
-  bool exists = false;  // false: the scene has no such parameter or control
+  bool exists = false;      // false: the scene has no such parameter or control
 };
 
 // A change that can be undone: the previous values of parameters, after loading `scene` if there is

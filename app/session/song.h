@@ -80,7 +80,7 @@ class Song {
   mutable std::mutex mutex_;  // guards all below
   std::condition_variable wake_;
   State state_;
-  double length_s_ = -1.0;           // negative: no song
+  double length_s_ = -1.0;  // negative: no song
   TempoMap tempos_;
   bool follows_clock_ = false;
   bool is_led_ = false;                       // the clock has started it

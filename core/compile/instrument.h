@@ -39,9 +39,9 @@ struct CustomInfo {
 // A controller to which the preset gives a name. The position of the knob, 0 to 1, is that of its
 // parameter in the knob's range, whatever has set the parameter.
 struct KnobInfo {
-  std::string name;  // "Bow pressure"
-  std::string word;  // the same in addresses and commands: "bow-pressure"
-  std::string help;  // one line; may be empty
+  std::string name;                      // "Bow pressure"
+  std::string word;                      // the same in addresses and commands: "bow-pressure"
+  std::string help;                      // one line; may be empty
   int controller = 0;                    // -1: none, only messages move it
   std::optional<std::size_t> parameter;  // nothing: the knob moves inputs only
   KnobRange range;                       // of the parameter

@@ -22,8 +22,8 @@ struct MidiFile {
     std::uint32_t first = 0;  // index into `bytes`
     std::uint32_t count = 0;
   };
-  std::vector<Message> messages;      // messages of all tracks, sorted by time, then by track
-  std::vector<std::uint8_t> bytes;    // bytes of the messages, each with its status byte
+  std::vector<Message> messages;    // messages of all tracks, sorted by time, then by track
+  std::vector<std::uint8_t> bytes;  // bytes of the messages, each with its status byte
   TempoMap tempos;
   double length_s = 0.0;              // time of the last event, ends of tracks included
   std::vector<std::string> warnings;  // damage that was read over

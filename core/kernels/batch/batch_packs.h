@@ -106,7 +106,7 @@ struct Rows {
   const T* velocity;
   V* outputs;
   bool is_common;
-  bool is_still;  // All samples of the inputs are the same.
+  bool is_still;      // All samples of the inputs are the same.
   std::size_t input;  // Numbers per sample of an input and an output.
   std::size_t in;
   std::size_t out;

@@ -9,7 +9,7 @@ namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 constexpr std::uint32_t frames_after_touch =
-    256;  // frames from a contact until a free block is tried again
+    256;                                // frames from a contact until a free block is tried again
 constexpr double most_surprise = 30.0;  // times the motion that is assumed at first
 constexpr std::uint32_t nowhere = 0xffffffffu;
 
