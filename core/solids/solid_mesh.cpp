@@ -13,7 +13,7 @@ namespace {
 constexpr std::array<std::array<std::size_t, 3>, 4> faces = {
     // The faces of a tetrahedron of positive volume, seen from outside.
     {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}}};
-constexpr double flat = 1e-10;  // Smallest volume, relative to the cube of the longest edge.
+constexpr double flat = 1e-7;  // Smallest volume, relative to the cube of the longest edge.
 
 double six_volumes(const std::vector<Point3>& points, const Tetrahedron& t) {
   const Point3& a = points[at(t[0])];

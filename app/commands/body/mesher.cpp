@@ -28,7 +28,8 @@ using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
 constexpr std::size_t max_mesh_bytes = std::size_t{1} << 31;
-constexpr double far_off = 1.4;  // a mesh finer or coarser than this factor is made again
+constexpr double most_unknowns = 3e5;  // unless twice the requested number is more
+constexpr double far_off = 1.4;        // a mesh finer or coarser than this factor is made again
 
 bool is_installed(const std::string& program) {
   const char* const path = std::getenv("PATH");
@@ -188,23 +189,30 @@ std::size_t unknowns_of(const TetrahedronMesh& mesh) {
 }
 
 // Meshes again with another size if the first mesh is far from the requested number of unknowns.
+// Returns an error if the surface has too many small triangles for this number.
 Result<TetrahedronMesh> fitted(double edge, double unknowns, const Fill& fill) {
   auto mesh = fill(edge);
   if (!mesh) {
     return mesh;
   }
-  const double ratio = static_cast<double>(unknowns_of(*mesh)) / unknowns;
+  double ratio = static_cast<double>(unknowns_of(*mesh)) / unknowns;
   if (ratio > 0.0 && (ratio > far_off || ratio < 1.0 / far_off)) {
     auto again = fill(edge * std::cbrt(ratio));
     if (again || again.error().message == stopped) {
-      return again;
+      mesh = std::move(again);
+      ratio = mesh ? static_cast<double>(unknowns_of(*mesh)) / unknowns : 0.0;
     }
+  }
+  if (ratio * unknowns > std::max(most_unknowns, 2.0 * unknowns)) {
+    return Error{"the mesh would have " + std::to_string(std::lround(ratio * unknowns)) +
+                 " unknowns"};
   }
   return mesh;
 }
 
 // Scales the mesh to the volume of the surface: straight edges cut off some of a round solid.
-void restore_volume(TetrahedronMesh& mesh, const ClosedSurface& closed) {
+// Returns the share of the volume that it had.
+double restore_volume(TetrahedronMesh& mesh, const ClosedSurface& closed) {
   double six = 0.0;
   for (const Tetrahedron& t : mesh.tetrahedra) {
     const auto point = [&](std::size_t i) { return mesh.points[static_cast<std::size_t>(t[i])]; };
@@ -218,6 +226,7 @@ void restore_volume(TetrahedronMesh& mesh, const ClosedSurface& closed) {
       point = middle + factor * (point - middle);
     }
   }
+  return 1.0 / (factor * factor * factor);
 }
 
 }  // namespace
@@ -271,7 +280,10 @@ Result<Meshed> fill_with_tetrahedra(const ClosedSurface& closed, const MeshOrder
     progress.stage("meshing with a grid");
     Meshed meshed{grid_mesh(closed, order.unknowns, progress), "ressort, on a grid", failures};
     if (!meshed.mesh.tetrahedra.empty()) {
-      restore_volume(meshed.mesh, closed);
+      const double share = restore_volume(meshed.mesh, closed);
+      meshed.failures += (failures.empty() ? "" : "\n") + std::string("the grid has ") +
+                         std::to_string(std::lround(100.0 * share)) +
+                         " % of the solid's volume; its modes are a rough estimate";
       return meshed;
     }
   }

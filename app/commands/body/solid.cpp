@@ -201,7 +201,7 @@ Result<Body> read_body(const SolidBodyOptions& options, const Progress& progress
     return located(meshed.error());
   }
   if (!meshed->failures.empty()) {
-    print_error("warning: " + meshed->failures + "\nmeshed by " + meshed->by + " instead");
+    print_error("warning: meshed by " + meshed->by + ": " + meshed->failures);
   }
   auto mesh = quadratic(meshed->mesh);
   if (!mesh) {

@@ -337,7 +337,8 @@ TEST_CASE("A missing mesher gives advice, and a hanging mesher is stopped", "[so
   const auto gridded = with_path(folders, {.unknowns = 3000.0, .limit_s = 0.1}, yes);
   REQUIRE(gridded);
   CHECK(gridded->by == "ressort, on a grid");
-  CHECK(gridded->failures == "gmsh was stopped after 0.1 s\ntetgen was stopped after 0.1 s");
+  CHECK(gridded->failures.find("gmsh was stopped after 0.1 s\ntetgen was stopped after 0.1 s\n") ==
+        0);
   int looks = 0;
   const auto called_off = with_path(folders, {.mesher = Mesher::tetgen},
                                     [&](std::string_view) { return ++looks < 10; });
