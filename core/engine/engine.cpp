@@ -362,7 +362,7 @@ struct Engine::Player {
   }
 
   std::size_t play(Segment segment) {
-    if (voices.is_idle() && !audio.find_sound(segment)) {
+    if (voices.is_idle() && !playing.noise && !audio.find_sound(segment)) {
       audio.keep_last_samples(segment);
       since_update = (since_update + segment.frames) % max_block_frames;
       return segment.end();
