@@ -290,7 +290,7 @@ TEST_CASE("a description of a thousand parameters arrives complete and in order"
   }
   CHECK(std::get<std::int32_t>(rows.back().values.at(0)) == static_cast<int>(rows.size()) - 1);
   rows.pop_back();
-  REQUIRE(rows.size() == addresses().size() + 2001);  // each parameter is a control, too
+  REQUIRE(rows.size() == addresses().size() + 2 * 1001);  // Each parameter is a control, too.
   for (std::size_t i = 0; i < 1000; ++i) {
     CHECK(rows[addresses().size() + i].text(0) == "/param/" + stem + std::to_string(1000 + i));
   }
