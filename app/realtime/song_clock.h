@@ -28,8 +28,8 @@ struct SongPlace {
   std::uint64_t jumps = 0;  // starts, stops and jumps so far
 };
 
-// Of the clock and the transport, the one that has started, stopped or jumped last leads. All
-// functions: [audio] wait-free
+// The clock or the transport leads, whichever has started, stopped or jumped last. All functions:
+// [audio] wait-free
 class SongClock {
  public:
   // Returns whether the message is a tick.

@@ -123,7 +123,7 @@ ShellElement shell_element(const std::array<Point3, 3>& corners, const SolidMate
                                       1.0 / length(first) * cross(n, first)};
   ShellElement element{.mass = material.density * thickness * area};
 
-  // In the plane: the displacement of the corners, and the slope of the deflection at the corners
+  // The displacement of the corners in the plane, and the slope of the deflection at the corners
   // and at the middles of the edges that follow them, which Kirchhoff's hypothesis ties to the
   // rotations (Batoz, Bathe and Ho 1980).
   std::array<Planar, 3> motion;

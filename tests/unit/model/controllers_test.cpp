@@ -100,7 +100,7 @@ TEST_CASE("a learned row takes the place of others, and all comments stay", "[co
   const auto same = [](const ControllerSetting& row) {
     return [row](const ControllerSetting& other) { return other == row; };
   };
-  // What is added to any text is read as it was, and goes without a trace.
+  // Rows added to any text are read as they were, and go without a trace.
   using enum ControllerMode;
   for (const std::string& before : {std::string(), text, std::string("# no end of the line")}) {
     for (const ControllerInput& input :
