@@ -4,7 +4,7 @@
 #include <numeric>
 #include <set>
 
-#include "core/analysis/proofs.h"
+#include "core/analysis/stability.h"
 #include "core/model/language/expression.h"
 
 namespace ressort::analysis {
@@ -40,7 +40,8 @@ std::string described(const Culprit& culprit) {
 }  // namespace
 
 // Finds a mass that is not above 0, or an argument that is not finite.
-std::optional<Proofs::Suspect> Proofs::find_invalid_number_in(std::span<const Range> arguments) {
+std::optional<Stability::Suspect> Stability::find_invalid_number_in(
+    std::span<const Range> arguments) {
   for (std::size_t row = 0; row < assembly_.masses.size(); ++row) {
     const Range mass = range_at(arguments, network_.masses[assembly_.masses[row]].mass);
     if (!(mass.lowest > 0.0 && std::isfinite(mass.highest))) {
@@ -57,7 +58,7 @@ std::optional<Proofs::Suspect> Proofs::find_invalid_number_in(std::span<const Ra
   return std::nullopt;
 }
 
-Proofs::Suspect Proofs::feeder(std::span<const Range> arguments) {
+Stability::Suspect Stability::feeder(std::span<const Range> arguments) {
   const std::span<const Load> all = lowest_loads(arguments);
   const auto least = std::min_element(all.begin(), all.end(), [](const Load& a, const Load& b) {
     return std::min(a.stiff, a.damped) < std::min(b.stiff, b.damped);
@@ -66,14 +67,16 @@ Proofs::Suspect Proofs::feeder(std::span<const Range> arguments) {
           static_cast<std::size_t>(least - all.begin()), true};
 }
 
-Proofs::Suspect Proofs::heavier_part(std::size_t term, std::span<const Range> arguments) const {
+Stability::Suspect Stability::heavier_part(std::size_t term,
+                                           std::span<const Range> arguments) const {
   const Load load = highest_load(network_, assembly_.terms[term], arguments, rate_ratio_);
   return {load.stiff >= load.damped + load.rubbed ? Quantity::stiffness : Quantity::damping, term};
 }
 
 // Finds the link with the most energy in the unstable motion.
-Proofs::Suspect Proofs::find_worst_link(const Weights& weights, std::span<const Range> arguments,
-                                        std::span<const double> shape) const {
+Stability::Suspect Stability::find_worst_link(const Weights& weights,
+                                              std::span<const Range> arguments,
+                                              std::span<const double> shape) const {
   if (shape.empty()) {
     return heavier_part(edge_bound(assembly_, weights).term, arguments);
   }
@@ -90,8 +93,8 @@ Proofs::Suspect Proofs::find_worst_link(const Weights& weights, std::span<const 
 }
 
 // Finds a mass that moves almost alone: it may be too light for its links together.
-std::optional<Proofs::Suspect> Proofs::find_lightest_mass(const Weights& weights,
-                                                          std::span<const double> shape) const {
+std::optional<Stability::Suspect> Stability::find_lightest_mass(
+    const Weights& weights, std::span<const double> shape) const {
   std::vector<double> inertia;
   for (std::size_t i = 0; i < shape.size(); ++i) {
     inertia.push_back(weights.masses[i] * shape[i] * shape[i]);
@@ -103,7 +106,7 @@ std::optional<Proofs::Suspect> Proofs::find_lightest_mass(const Weights& weights
   return Suspect{Quantity::mass, static_cast<std::size_t>(most - inertia.begin())};
 }
 
-ArgumentId Proofs::argument_of(const Suspect& suspect, std::span<const Range> arguments) const {
+ArgumentId Stability::argument_of(const Suspect& suspect, std::span<const Range> arguments) const {
   if (suspect.quantity == Quantity::mass) {
     return network_.masses[assembly_.masses[suspect.index]].mass;
   }
@@ -116,7 +119,7 @@ ArgumentId Proofs::argument_of(const Suspect& suspect, std::span<const Range> ar
   return suspect.quantity == Quantity::stiffness ? mass.stiffness : mass.damping;
 }
 
-const SourceLocation& Proofs::location_of(const Suspect& suspect) const {
+const SourceLocation& Stability::location_of(const Suspect& suspect) const {
   if (suspect.quantity == Quantity::mass) {
     return network_.masses[assembly_.masses[suspect.index]].location;
   }
@@ -125,7 +128,7 @@ const SourceLocation& Proofs::location_of(const Suspect& suspect) const {
                       : network_.masses[term.element].location;
 }
 
-Culprit Proofs::accuse(const Suspect& suspect, std::span<const Range> arguments) const {
+Culprit Stability::accuse(const Suspect& suspect, std::span<const Range> arguments) const {
   Culprit culprit;
   culprit.quantity = suspect.quantity;
   culprit.location = location_of(suspect);
@@ -159,7 +162,7 @@ Culprit Proofs::accuse(const Suspect& suspect, std::span<const Range> arguments)
 
 // Returns the number of elements whose quantity is written with the same argument; a macro counts
 // as one.
-std::size_t Proofs::users(const Suspect& suspect, std::span<const Range> arguments) const {
+std::size_t Stability::users(const Suspect& suspect, std::span<const Range> arguments) const {
   const ArgumentId argument = argument_of(suspect, arguments);
   const std::size_t count =
       suspect.quantity == Quantity::mass ? assembly_.masses.size() : assembly_.terms.size();
@@ -174,7 +177,7 @@ std::size_t Proofs::users(const Suspect& suspect, std::span<const Range> argumen
 }
 
 // Returns how far one argument may go with all others unchanged.
-std::optional<double> Proofs::limit(const Suspect& suspect, std::span<const Range> arguments) {
+std::optional<double> Stability::limit(const Suspect& suspect, std::span<const Range> arguments) {
   const ArgumentId argument = argument_of(suspect, arguments);
   if (argument == no_argument) {
     return std::nullopt;

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "core/analysis/proofs.h"
 #include "core/laws/law.h"
 #include "core/model/topology.h"
 
@@ -45,7 +44,7 @@ Network always_felt(Network network) {
   return network;
 }
 
-Proofs::Proofs(Network network, double rate_ratio, std::size_t most_exact, Progress progress)
+Stability::Stability(Network network, double rate_ratio, std::size_t most_exact, Progress progress)
     : macros_(network.macros),
       network_(network.macros.empty() ? std::move(network) : expand_macros(network)),
       rate_ratio_(rate_ratio),
@@ -57,7 +56,7 @@ Proofs::Proofs(Network network, double rate_ratio, std::size_t most_exact, Progr
 
 // --- weights ------------------------------------------------------------------------------------
 
-std::span<const Range> Proofs::ranges(const ParameterBox& box) {
+std::span<const Range> Stability::ranges(const ParameterBox& box) {
   const std::size_t count = box.lowest.size();
   std::vector<bool> has_moved(count, true);
   for (std::size_t i = 0; i < std::min(count, box_.lowest.size()); ++i) {
@@ -77,8 +76,8 @@ std::span<const Range> Proofs::ranges(const ParameterBox& box) {
   return ranges_;
 }
 
-std::span<const Load> Proofs::update(LastLoads& last, std::span<const Range> arguments,
-                                     LoadOfTerm load_of) const {
+std::span<const Load> Stability::update(LastLoads& last, std::span<const Range> arguments,
+                                        LoadOfTerm load_of) const {
   const std::size_t count = assembly_.terms.size();
   progress_.spend(count);
   const bool is_first = last.arguments.empty();
@@ -106,7 +105,7 @@ std::span<const Load> Proofs::update(LastLoads& last, std::span<const Range> arg
   return last.loads;
 }
 
-Weights Proofs::weights_for(std::span<const Range> arguments) {
+Weights Stability::weights_for(std::span<const Range> arguments) {
   Weights weights;
   for (const std::uint32_t mass : assembly_.masses) {
     weights.masses.push_back(range_at(arguments, network_.masses[mass].mass).lowest);
@@ -118,7 +117,7 @@ Weights Proofs::weights_for(std::span<const Range> arguments) {
   return weights;
 }
 
-Weights Proofs::weights_for(std::span<const Range> arguments, const RangeOverride& instead) {
+Weights Stability::weights_for(std::span<const Range> arguments, const RangeOverride& instead) {
   std::vector<Range> changed(arguments.begin(), arguments.end());
   changed[instead.argument] = {instead.value, instead.value};
   Weights weights = weights_for(arguments);
@@ -139,7 +138,7 @@ Weights Proofs::weights_for(std::span<const Range> arguments, const RangeOverrid
 
 // Single terms may be negative as long as their sum is not: a spring that pushes beside one that
 // pulls. A link on a waveguide is not part of a sum.
-bool Proofs::gains_energy(std::span<const Range> arguments) {
+bool Stability::gains_energy(std::span<const Range> arguments) {
   if (std::none_of(arguments.begin(), arguments.end(),
                    [](const Range& range) { return range.lowest < 0.0; })) {
     return false;
@@ -159,7 +158,7 @@ bool Proofs::gains_energy(std::span<const Range> arguments) {
   return least < 0.0 && !(boundary_.is_exact() && is_positive(stiff) && is_positive(damped));
 }
 
-bool Proofs::is_positive(std::span<const double> terms) {
+bool Stability::is_positive(std::span<const double> terms) {
   double largest = 0.0;
   std::vector<double> negated;
   for (const double term : terms) {
@@ -174,7 +173,7 @@ bool Proofs::is_positive(std::span<const double> terms) {
 }
 
 // Returns how the stability-relevant numbers depend on one parameter.
-Proofs::Course Proofs::course_along(std::size_t parameter) const {
+Stability::Course Stability::course_along(std::size_t parameter) const {
   const auto index = static_cast<std::uint32_t>(parameter);
   std::vector<bool> is_used(network_.arguments.size(), false);
   const auto use = [&](ArgumentId id) {
@@ -211,7 +210,7 @@ Proofs::Course Proofs::course_along(std::size_t parameter) const {
 
 // --- queries ------------------------------------------------------------------------------------
 
-Verdict Proofs::prove(const ParameterBox& box) {
+Verdict Stability::prove(const ParameterBox& box) {
   const std::span<const Range> arguments = ranges(box);
   const Weights weights = weights_for(arguments);
   return boundary_.holds(weights, safe_limit)                            ? Verdict::stable
@@ -219,7 +218,7 @@ Verdict Proofs::prove(const ParameterBox& box) {
                                                                          : Verdict::unproved;
 }
 
-Certificate Proofs::certify(const ParameterBox& box) {
+Certificate Stability::certify(const ParameterBox& box) {
   const Verdict verdict = prove(box);
   if (verdict == Verdict::stable || !assembly_.is_complete) {
     return {.verdict = verdict};
@@ -255,8 +254,23 @@ Certificate Proofs::certify(const ParameterBox& box) {
   return {verdict, boundary.value, std::move(culprit)};
 }
 
-std::optional<SafeRange> Proofs::safe_range(const ParameterBox& box, std::size_t parameter,
-                                            double start) {
+std::optional<SafeRange> Stability::safe_range(const ParameterBox& box, std::size_t parameter,
+                                               double start) {
+  auto safe = safe_range_beside(box, parameter, start);
+  if (start == 0.0 && safe && safe->lowest == 0.0) {
+    // Searches the other side of 0, too, unless it is unstable at once, as a negative stiffness is.
+    constexpr double beside = 1e-6;
+    const auto below = safe_range_beside(box, parameter, -beside);
+    if (below && below->highest > -beside && below->lowest < -beside) {
+      safe->lowest = below->lowest;
+    }
+  }
+  return safe;
+}
+
+// Searches only the side of 0 on which `start` lies; the positive side from 0.
+std::optional<SafeRange> Stability::safe_range_beside(const ParameterBox& box,
+                                                      std::size_t parameter, double start) {
   const Course course = course_along(parameter);
   const double side = start < 0.0 ? -1.0 : 1.0;
   // Tests all values from `from` to `to` at once; for a straight course the ends are enough.
@@ -286,7 +300,7 @@ std::optional<SafeRange> Proofs::safe_range(const ParameterBox& box, std::size_t
   return start < 0.0 ? SafeRange{-found.highest, -found.lowest} : found;
 }
 
-SafeRange Proofs::range_around(const WeightLine& line, double anchor) {
+SafeRange Stability::range_around(const WeightLine& line, double anchor) {
   SafeRange range{0.0, unbounded};
   if (const auto boundary =
           boundary_.is_exact() ? std::nullopt : boundary_.bound_crossing(line, anchor)) {
@@ -307,7 +321,7 @@ SafeRange Proofs::range_around(const WeightLine& line, double anchor) {
   return range;
 }
 
-double Proofs::share(const ParameterBox& safe, const ParameterBox& wide) {
+double Stability::share(const ParameterBox& safe, const ParameterBox& wide) {
   const auto line = [&](double way) {
     ParameterBox box;
     for (std::size_t i = 0; i < safe.lowest.size(); ++i) {
@@ -319,7 +333,7 @@ double Proofs::share(const ParameterBox& safe, const ParameterBox& wide) {
   return boundary_.holds(line(1.0), safe_limit) ? 1.0 : boundary_.between(line, 0.0, 1.0).value;
 }
 
-double Proofs::stiffness_factor(const ParameterBox& box) {
+double Stability::stiffness_factor(const ParameterBox& box) {
   const std::span<const Range> arguments = ranges(box);
   const Weights weights = weights_for(arguments);
   const std::span<const Load> all = loads(arguments);
@@ -335,53 +349,6 @@ double Proofs::stiffness_factor(const ParameterBox& box) {
     return boundary ? boundary->value : unbounded;
   }
   return boundary_.holds(line(0.0), 4.0) ? boundary_.between(line, 0.0, 1.0).value : 0.0;
-}
-
-// --- public interface ---------------------------------------------------------------------------
-
-Stability::Stability(Network network, double rate_ratio, std::size_t most_exact, Progress progress)
-    : proofs_(std::make_unique<Proofs>(std::move(network), rate_ratio, most_exact,
-                                       std::move(progress))) {}
-Stability::~Stability() = default;
-Stability::Stability(Stability&&) noexcept = default;
-Stability& Stability::operator=(Stability&&) noexcept = default;
-
-bool Stability::is_exact() {
-  return proofs_->is_exact();
-}
-
-std::size_t Stability::size() const {
-  return proofs_->size();
-}
-
-Verdict Stability::prove(const ParameterBox& box) {
-  return proofs_->prove(box);
-}
-
-Certificate Stability::certify(const ParameterBox& box) {
-  return proofs_->certify(box);
-}
-
-std::optional<SafeRange> Stability::safe_range(const ParameterBox& box, std::size_t parameter,
-                                               double start) {
-  auto safe = proofs_->safe_range(box, parameter, start);
-  if (start == 0.0 && safe && safe->lowest == 0.0) {
-    // Searches the other side of 0, too, unless it is unstable at once, as a negative stiffness is.
-    constexpr double beside = 1e-6;
-    const auto below = proofs_->safe_range(box, parameter, -beside);
-    if (below && below->highest > -beside && below->lowest < -beside) {
-      safe->lowest = below->lowest;
-    }
-  }
-  return safe;
-}
-
-double Stability::share(const ParameterBox& safe, const ParameterBox& wide) {
-  return proofs_->share(safe, wide);
-}
-
-double Stability::stiffness_factor(const ParameterBox& box) {
-  return proofs_->stiffness_factor(box);
 }
 
 }  // namespace ressort::analysis

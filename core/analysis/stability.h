@@ -11,10 +11,13 @@
 // stability, and does not bound the energy that a hard contact may gain.
 #pragma once
 
-#include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
+#include "core/analysis/assembly.h"
+#include "core/analysis/boundary.h"
 #include "core/analysis/interval.h"
 #include "core/model/network.h"
 #include "core/progress.h"
@@ -84,8 +87,6 @@ Network always_felt(Network network);
 // Returns "stable below 1.31568", "stable between 0.1 and 4" or "stable anywhere".
 std::string describe(const SafeRange& safe);
 
-class Proofs;
-
 // Proofs and limits for one network, whose macros are expanded once. Exact up to `most_exact`
 // masses unless their links are too random for a factorisation (Cholesky::most_work); otherwise by
 // the edge bound, on the safe side. A link at a moving place counts at the worst of its nodes:
@@ -96,14 +97,12 @@ class Stability {
 
   Stability(Network network, double rate_ratio, std::size_t most_exact = most_exact_masses,
             Progress progress = {});
-  ~Stability();
-  Stability(Stability&&) noexcept;
-  Stability& operator=(Stability&&) noexcept;
+  Stability(const Stability&) = delete;
 
   // Returns whether results are exact; otherwise they come from the edge bound.
-  bool is_exact();
+  bool is_exact() { return boundary_.is_exact(); }
   // Returns the number of links and oscillators.
-  std::size_t size() const;
+  std::size_t size() const { return assembly_.terms.size(); }
 
   // Returns whether the network is stable with the parameters anywhere in the box. O(links) if the
   // edge bound proves it, else one factorisation.
@@ -128,7 +127,71 @@ class Stability {
   double stiffness_factor(const ParameterBox& box);
 
  private:
-  std::unique_ptr<Proofs> proofs_;
+  // Replaces the range of an argument for one quantity. The same text may be a stiffness in one
+  // place and a damping in another; only the one quantity changes.
+  struct RangeOverride {
+    Quantity quantity = Quantity::stiffness;
+    ArgumentId argument = no_argument;
+    double value = 0.0;
+  };
+  // The stiffness or damping of a term, or the mass of a row.
+  struct Suspect {
+    Quantity quantity = Quantity::stiffness;
+    std::size_t index = 0;
+    bool gains_energy = false;  // Unstable because it is negative, not because it is too large.
+  };
+  enum class Course { flat, straight, bent };
+
+  // The last query. A query along one parameter changes few formulas and few terms, and only these
+  // are computed anew.
+  struct LastLoads {
+    std::vector<Range> arguments;  // [argument]
+    std::vector<Load> loads;       // [term]
+  };
+  using LoadOfTerm = Load (*)(const Network&, const Assembly::Term&, std::span<const Range>,
+                              double);
+
+  std::span<const Range> ranges(const ParameterBox& box);
+  std::span<const Load> loads(std::span<const Range> arguments) {
+    return update(highest_, arguments, highest_load);
+  }
+  std::span<const Load> lowest_loads(std::span<const Range> arguments) {
+    return update(lowest_, arguments, lowest_load);
+  }
+  std::span<const Load> update(LastLoads& last, std::span<const Range> arguments,
+                               LoadOfTerm load_of) const;
+  Weights weights_for(std::span<const Range> arguments);
+  Weights weights_for(std::span<const Range> arguments, const RangeOverride& instead);
+  bool gains_energy(std::span<const Range> arguments);
+  bool is_positive(std::span<const double> terms);
+  Course course_along(std::size_t parameter) const;
+  std::optional<SafeRange> safe_range_beside(const ParameterBox& box, std::size_t parameter,
+                                             double start);
+  SafeRange range_around(const WeightLine& line, double anchor);
+
+  // Defined in culprit.cpp.
+  std::optional<Suspect> find_invalid_number_in(std::span<const Range> arguments);
+  Suspect feeder(std::span<const Range> arguments);
+  Suspect find_worst_link(const Weights& weights, std::span<const Range> arguments,
+                          std::span<const double> shape) const;
+  std::optional<Suspect> find_lightest_mass(const Weights& weights,
+                                            std::span<const double> shape) const;
+  Suspect heavier_part(std::size_t term, std::span<const Range> arguments) const;
+  Culprit accuse(const Suspect& suspect, std::span<const Range> arguments) const;
+  ArgumentId argument_of(const Suspect& suspect, std::span<const Range> arguments) const;
+  std::optional<double> limit(const Suspect& suspect, std::span<const Range> arguments);
+  std::size_t users(const Suspect& suspect, std::span<const Range> arguments) const;
+  const SourceLocation& location_of(const Suspect& suspect) const;
+
+  std::vector<Macro> macros_;
+  Network network_;  // Without macros.
+  double rate_ratio_;
+  Progress progress_;
+  Assembly assembly_;
+  BoundaryFinder boundary_;
+  ParameterBox box_;           // of the last query
+  std::vector<Range> ranges_;  // [argument] of the last query
+  LastLoads highest_, lowest_;
 };
 
 }  // namespace ressort::analysis

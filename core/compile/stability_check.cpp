@@ -27,10 +27,10 @@ class StabilityChecker {
   explicit StabilityChecker(const StabilityRequest& request)
       : request_(request),
         start_(request.start.begin(), request.start.end()),
-        stability_(felt(), request.rate_ratio, most_quick_masses, request.progress) {
+        stability_(std::in_place, felt(), request.rate_ratio, most_quick_masses, request.progress) {
     result_.proved = without_passive(starting(request.written), request.schemes);
     result_.parameters = request.parameters;
-    result_.is_together = start_.size() * stability_.size() > most_quick_work;
+    result_.is_together = start_.size() * stability_->size() > most_quick_work;
   }
 
   StabilityCheck run() {
@@ -69,13 +69,13 @@ class StabilityChecker {
   bool is_audio(std::size_t i) const { return request_.expanded.parameters[i].audio_input > 0; }
 
   Verdict prove_start() {
-    const Verdict verdict = stability_.prove(box_);
+    const Verdict verdict = stability_->prove(box_);
     if (verdict != Verdict::unproved || request_.expanded.masses.size() <= most_quick_masses) {
       return verdict;
     }
-    stability_ =
-        Stability(felt(), request_.rate_ratio, Stability::most_exact_masses, request_.progress);
-    return stability_.prove(box_);
+    stability_.emplace(felt(), request_.rate_ratio, Stability::most_exact_masses,
+                       request_.progress);
+    return stability_->prove(box_);
   }
 
   // Names the culprit in the written network, where a macro is one element.
@@ -149,32 +149,32 @@ class StabilityChecker {
     if (which.empty()) {
       return;
     }
-    if (stability_.prove(wide) == Verdict::stable) {
+    if (stability_->prove(wide) == Verdict::stable) {
       box_ = std::move(wide);
       return;
     }
     for (std::size_t i = 0; !result_.is_together && i < which.size(); ++i) {
       extend_alone(which[i], box_, wide);
     }
-    if (!result_.is_together && stability_.prove(wide) == Verdict::stable) {
+    if (!result_.is_together && stability_->prove(wide) == Verdict::stable) {
       box_ = std::move(wide);
       return;
     }
     // Finds the largest share for all by bisection; then each parameter takes the remaining room.
-    const double share = stability_.share(box_, wide);
+    const double share = stability_->share(box_, wide);
     ParameterBox shared = box_;
     for (const std::size_t i : which) {
       shared.lowest[i] = towards(start_[i], std::lerp(start_[i], wide.lowest[i], share));
       shared.highest[i] = towards(start_[i], std::lerp(start_[i], wide.highest[i], share));
     }
-    if (stability_.prove(shared) != Verdict::stable) {
+    if (stability_->prove(shared) != Verdict::stable) {
       return;
     }
     for (std::size_t k = 0; !result_.is_together && k < which.size(); ++k) {
       const std::size_t i = which[k];
       ParameterBox wider = shared;
       extend_alone(i, shared, wider);
-      if (stability_.prove(wider) == Verdict::stable) {
+      if (stability_->prove(wider) == Verdict::stable) {
         shared = std::move(wider);
       }
     }
@@ -305,7 +305,7 @@ class StabilityChecker {
 
   // Extends one parameter as far as is stable with the others in `from`.
   void extend_alone(std::size_t i, const ParameterBox& from, ParameterBox& box) {
-    if (const auto safe = stability_.safe_range(from, i, start_[i])) {
+    if (const auto safe = stability_->safe_range(from, i, start_[i])) {
       box.lowest[i] = std::max(wanted_.lowest[i], below(i, safe->lowest));
       box.highest[i] = std::min(wanted_.highest[i], above(i, safe->highest));
     } else {
@@ -335,7 +335,7 @@ class StabilityChecker {
     }
     if (const auto safe = request_.bare || result_.is_together
                               ? std::nullopt
-                              : stability_.safe_range(box_, i, start_[i])) {
+                              : stability_->safe_range(box_, i, start_[i])) {
       info.safe = *safe;
     }
     if (is_audio(i)) {
@@ -377,7 +377,7 @@ class StabilityChecker {
 
   const StabilityRequest& request_;
   std::vector<double> start_;
-  Stability stability_;
+  std::optional<Stability> stability_;
   StabilityCheck result_;
   ParameterBox asked_;                                // requested values
   ParameterBox wanted_;                               // values that make no stiffness negative
