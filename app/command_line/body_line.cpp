@@ -22,6 +22,7 @@ const char* const examples =
     "elements find\n"
     "  its modes. ressort meshes boxes, balls and shells itself; other solids need gmsh or "
     "tetgen.\n"
+    "- a resonance model: a text with the frequency, amplitude and bandwidth of each mode.\n"
     "- a model (.mdl). The body has its modes, with its inputs and outputs as places. With --chain "
     "it\n"
     "  becomes a chain of masses and springs with the same response at one place.\n"

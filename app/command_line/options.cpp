@@ -112,9 +112,8 @@ void add_budget(CLI::App& command, std::optional<Budget>& budget) {
       ->type_name("TEXT");
 }
 
-void add_strict(CLI::App& command, bool& is_strict) {
-  command.add_flag("--strict", is_strict,
-                   "fail (exit code 2) if the budget may be missed, or if a MIDI file is damaged");
+void add_strict(CLI::App& command, bool& is_strict, const std::string& cases) {
+  command.add_flag("--strict", is_strict, "fail (exit code 2) if " + cases);
 }
 
 void add_no_rescale(CLI::App& command, bool& rescale) {

@@ -16,8 +16,8 @@
 
 namespace ressort::command_line {
 
-// Makes the options of a command, which live as long as it. After parsing, run(options) sets the
-// exit code.
+// Creates the options of a command, with the lifetime of the command. After parsing, run(options)
+// sets the exit code.
 template <class Options, class Run>
 Options& run_with(CLI::App& command, int& code, Run run) {
   const auto options = std::make_shared<Options>();
@@ -48,7 +48,7 @@ void add_motion(CLI::App& command, std::optional<ThirdArgument>& third);
 
 void add_method(CLI::App& command, std::optional<Method>& method);
 void add_budget(CLI::App& command, std::optional<Budget>& budget);
-void add_strict(CLI::App& command, bool& is_strict);
+void add_strict(CLI::App& command, bool& is_strict, const std::string& cases);
 void add_force(CLI::App& command, bool& force);
 
 void add_no_rescale(CLI::App& command, bool& rescale);

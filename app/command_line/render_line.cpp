@@ -69,10 +69,11 @@ void add_render(CLI::App& app, int& code) {
   add_rate(*command, "-r,--rate", options.rate_hz, 1000.0, 768000.0);
   command->add_option("--input", options.input, "sound file whose channel N drives input N")
       ->type_name("FILE");
-  command->add_option("--score", options.score, "score file")->type_name("FILE");
+  command->add_option("--score", options.score, "score file; - reads the standard input")
+      ->type_name("FILE");
   command
       ->add_option("--midi", options.midi,
-                   "Standard MIDI File, type 0 or 1, rendered until it is silent")
+                   "Standard MIDI File (.mid, .rmi), rendered until it is silent")
       ->type_name("FILE");
   add_settings(*command, options.parameters);
   command
@@ -89,7 +90,7 @@ void add_render(CLI::App& app, int& code) {
   add_numbers(*command, options.precision, options.rescale);
   add_method(*command, options.method);
   add_budget(*command, options.budget);
-  add_strict(*command, options.is_strict);
+  add_strict(*command, options.is_strict, "the budget may be missed, or if a MIDI file is damaged");
   add_motion(*command, options.third);
   add_force(*command, options.force);
   command->add_option("-p,--voices", options.voices, "number of voices (default: the preset's)")

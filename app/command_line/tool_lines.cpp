@@ -111,7 +111,7 @@ void add_check(CLI::App& app, int& code) {
   add_motion(*command, options.third);
   add_method(*command, options.method);
   add_budget(*command, options.budget);
-  add_strict(*command, options.is_strict);
+  add_strict(*command, options.is_strict, "the budget may be missed");
 }
 
 void add_make(CLI::App& app, int& code) {

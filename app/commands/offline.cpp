@@ -45,8 +45,9 @@ Error at(const std::string& path, const Error& error) {
   return {to_string(finding_of(path, "", error))};
 }
 
-// Reads a score, which may come through a pipe.
-Result<std::string> read_score_text(const std::string& path) {
+// Reads a score, which may come through a pipe or, as '-', from the standard input.
+Result<std::string> read_score_text(const std::string& name) {
+  const std::string path = name == "-" ? "/dev/stdin" : name;
   std::error_code error;
   if (!std::filesystem::is_fifo(path, error) && !std::filesystem::is_character_file(path, error)) {
     return read_text(path, max_score_bytes);
@@ -67,6 +68,9 @@ Result<std::vector<ScoreLine>> read_score(const RenderOptions& options) {
   auto text = read_score_text(options.score);
   if (!text) {
     return text.error();
+  }
+  if (text->starts_with("MThd")) {
+    return Error{"'" + options.score + "' is a MIDI file; pass it with --midi"};
   }
   auto lines = parse_score(*text);
   return lines ? std::move(lines) : at(options.score, lines.error());

@@ -55,7 +55,7 @@ struct Rendered {
   bool is_proved = false;  // stable
   bool was_interrupted = false;
   std::vector<std::string> warnings;
-  std::optional<Error> failure;  // error of the disk; no file is kept
+  std::optional<Error> failure;  // error of the disk; the file is deleted
 };
 
 // Renders to the output file. `progress` gets the finished share, 0 before anything is written, and

@@ -61,7 +61,7 @@ expect 2 "the limit is 32 MiB" "$program" check large.mdl
 expect 2 "there is no file 'nosuch.wav'" "$program" body nosuch.wav
 expect 2 'found a zero byte' "$program" body binary.mdl
 model text.wav 'no sound at all'
-expect 2 "'text.wav' is not a readable sound file" "$program" body text.wav
+expect 2 "'text.wav' looks like text; bodies are made of" "$program" body text.wav
 printf '0 /note/on 60 100\n' > blow.txt
 expect 0 "blow.flac" "$program" render BarMetals --score blow.txt -s 2 -o blow.flac
 expect 0 "@blow body 40 hit left right" "$program" body blow.flac
@@ -320,6 +320,10 @@ expect 2 "--set m_Q=1: /param/m_Q: the model has no such parameter; it has m_K, 
   "$program" render PolyTriangle -o out.wav --set m_Q=1
 model marked.score '\357\273\2770.0 /note/on 60 100\n'
 expect 0 "peak -" "$program" render PolyTriangle -o out.wav --score marked.score --seconds 0.1
+expect 0 "peak -" sh -c 'exec "$0" render PolyTriangle -o out.wav --score - -s 0.1 <marked.score' "$program"
+printf 'MThd\0\0\0\6' >tune.score
+expect 2 "tune.score' is a MIDI file; pass it with --midi" \
+  "$program" render PolyTriangle -o out.wav --score tune.score
 model wide.score '\377\3760\0'
 expect 2 "wide.score' is text in UTF-16" "$program" render PolyTriangle -o out.wav --score wide.score
 expect 0 "the number of cores of this machine" \

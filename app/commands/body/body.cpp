@@ -8,12 +8,13 @@
 #include "app/commands/output.h"
 #include "app/exit_code.h"
 #include "app/session/files.h"
+#include "app/session/sound_file.h"
 #include "core/solids/surface.h"
 
 namespace ressort::commands {
 namespace {
 
-// Returns the kind of a file that cannot be read, by its first bytes, or an empty string.
+// Returns the kind of a file that cannot be read, by its first bytes.
 std::string_view likely_kind(std::string_view bytes) {
   constexpr std::pair<std::string_view, std::string_view> kinds[] = {
       {"glTF", "glTF, a 3D scene"},
@@ -30,7 +31,7 @@ std::string_view likely_kind(std::string_view bytes) {
       return kind;
     }
   }
-  return "";
+  return bytes.find('\0') == std::string_view::npos ? "text" : "data of an unknown kind";
 }
 
 }  // namespace
@@ -82,8 +83,8 @@ int body_command(const BodyRequest& request) {
   if (const auto resonances = parse_resonances(*bytes)) {
     return resonance_body(*resonances, common(request.recording), request.mass);
   }
-  if (const std::string_view other = likely_kind(*bytes); !other.empty()) {
-    return reject("'" + request.input + "' looks like " + std::string(other) +
+  if (!SoundReader::open(request.input)) {
+    return reject("'" + request.input + "' looks like " + std::string(likely_kind(*bytes)) +
                   "; bodies are made of sound files, of solids in STL, OBJ, PLY or OFF, of "
                   "resonance models (frequency, amplitude, bandwidth) and of .mdl models");
   }
