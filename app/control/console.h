@@ -52,7 +52,7 @@ class Console {
   // Returns whether `quit` was executed. [console thread]
   bool has_quit() const;
 
-  // Sets the keyboard that the command `keys` plays from; without one it fails.
+  // Sets the keyboard of the command `keys`, which fails without a keyboard.
   void set_keyboard(Keyboard keyboard);
 
   // Returns the words that could complete the last word of `line`: commands, parameters, presets,

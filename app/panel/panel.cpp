@@ -117,7 +117,8 @@ class News {
   std::uint64_t count_ = 0;  // Number of messages so far.
 };
 
-// A thread for each connection: one that says nothing, or streams, does not keep others waiting.
+// Serves each connection on its own thread, so that a silent or an endless one does not delay
+// others.
 class Connections : public httplib::TaskQueue {
  public:
   void enqueue(std::function<void()> serve) override {

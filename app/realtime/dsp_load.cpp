@@ -71,7 +71,7 @@ std::optional<int> DspLoad::steal_voices(int sounding, int all) {
     return all;
   }
   if (lasting_ < 1.0 && lasting_ > unmoved * before_ && before_ > 0.0) {
-    return {};  // it fits, and stealing more would not help
+    return {};  // The voices fit, and fading more of them would not help.
   }
   before_ = lasting_;
   limit_ = std::clamp(affordable(sounding, lasting_), 1, sounding - 1);

@@ -19,7 +19,7 @@ constexpr double twin = 0.15;  // Poles closer than this share of their damping 
 // Least squared amplitude over twice its variance; noise reaches this with a probability of e^-21.
 constexpr double chance = 21.0;
 constexpr double deepest_db = -110.0;      // Modes this far below the strongest one are dropped.
-constexpr double least_freedoms = 100.0;   // Of a band that tells the noise level around a mode.
+constexpr double least_freedoms = 100.0;   // Size of the band whose noise is measured.
 constexpr std::size_t least_fitted = 150;  // Number of modes that are fitted at once if found.
 // Modes that leave less than this share of the energy are not those of noise.
 constexpr double most_of_noise = 0.8;
@@ -211,7 +211,7 @@ class Search {
     }
   }
 
-  // Starts from these poles instead of a search, without those that noise could explain.
+  // Replaces the search by these poles, except those that noise could explain.
   void start(const std::vector<Complex>& poles) {
     fit_.set_poles(poles);
     for (int round = 0; round < 20 && drop_unlikely() + drop_uncertain() > 0; ++round) {

@@ -86,7 +86,8 @@ struct OutputSlot {
       false;  // the force of the links and of this sample's inputs, at the reference rate
   // Derivative of the position that the engine computes: 1 or 2. Kernels ignore it.
   std::uint8_t derivative = 0;
-  // Gain that the engine applies: steps of Program::steps; none: 1. Kernels ignore it.
+  // Gain that the engine applies, as steps of Program::steps, or 1 without steps. Kernels ignore
+  // it.
   Coefficient level{};
   std::uint32_t origin = 0;  // index into Network::outputs
 };

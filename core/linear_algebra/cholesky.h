@@ -43,7 +43,7 @@ class Cholesky {
  private:
   struct Factor;
   std::unique_ptr<Factor> factor_;
-  std::size_t steps_ = 0;  // Of a factorisation, as Progress counts them.
+  std::size_t steps_ = 0;  // Number of steps reported to Progress.
 };
 
 }  // namespace ressort::linear_algebra

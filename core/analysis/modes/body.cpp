@@ -103,7 +103,7 @@ Tridiagonal tridiagonal_of(const Vector& values, const Vector& start) {
 // Returns u of T u = (1, 0, 0, ...), where T has -beside off its diagonal.
 std::vector<double> solve_first(const Tridiagonal& t) {
   const std::size_t size = t.diagonal.size();
-  std::vector<double> pivot = t.diagonal;  // From the end upwards.
+  std::vector<double> pivot = t.diagonal;  // Filled from the last to the first.
   for (std::size_t i = size - 1; i-- > 0;) {
     pivot[i] -= t.beside[i] * t.beside[i] / pivot[i + 1];
   }

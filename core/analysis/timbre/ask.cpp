@@ -29,7 +29,7 @@ constexpr int most_hops = 4;          // Hops per start.
 constexpr int most_turns = 60;
 constexpr int most_tries = 8;        // Attempts per step, each shorter than the one before.
 constexpr int most_stale_tries = 2;  // Attempts with outdated slopes.
-// A step that leaves at most this fraction of the cost confirms its slopes.
+// The slopes are kept after a step that reduces the cost to at most this fraction.
 constexpr double well_told = 0.25;
 
 using Place = std::vector<double>;  // [free parameter] 0 to 1.

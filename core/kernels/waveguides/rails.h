@@ -92,7 +92,7 @@ class Rails {
   std::vector<std::uint32_t> end, next_end;
   Aligned<T> allpass, pole, gain, next_allpass, next_pole, next_gain;
   Aligned<T> allpass_state, pole_state;
-  // [place][lane] Delays at which the waves pass it.
+  // [place][lane] Delays at which the waves pass the place.
   std::vector<std::uint32_t> right, left, next_right, next_left;
   std::vector<std::uint32_t> gives;  // [place] Coefficient 1/R.
   // [place][sample of the run][lane] `comes`: the arriving waves, right and left. `goes`: the

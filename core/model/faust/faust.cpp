@@ -345,9 +345,9 @@ class FaustPassive {
     return faust_sum(sum);
   }
 
-  // The force of one link. Its names: c_ is its distance two samples before the end of this one, e_
-  // how fast that distance grew, s_ how far it would change without the link, gamma_ its
-  // compliance. No damper acts in the first sample, where 1' is 0.
+  // Returns the force of one link. The signal c_ is the distance of its ends two samples earlier,
+  // e_ is the speed of that distance, s_ is its change without the link, and gamma_ is the
+  // compliance. Dampers do not act in the first sample, where 1' is 0.
   std::string force(const FaustTerms& terms, std::uint32_t index) const {
     const Link& link = network_.links[index];
     const LawFacts& law = facts(index);

@@ -103,7 +103,7 @@ TEST_CASE("events with a time have constant latency", "[process]") {
     CAPTURE(frame);
     CHECK(pushed_at(harness.y()) == frame + 256);
   }
-  // Before the last period: at the first frame. In the future: within this block.
+  // An event from the past acts at the first frame, one from the far future within this block.
   for (const std::int64_t when : {std::int64_t{0}, std::int64_t{1000000000}}) {
     Harness harness;
     harness.process.slot.offer(sounding(clock_text, Preset{}, 1));
