@@ -20,8 +20,10 @@ install(TARGETS ressort)
 install(DIRECTORY models presets DESTINATION ${CMAKE_INSTALL_DATADIR}/ressort
   FILES_MATCHING PATTERN "*.mdl" PATTERN "*.toml" PATTERN "*.scl" PATTERN "*.kbm")
 install(FILES ${packaging}/ressort.desktop DESTINATION ${CMAKE_INSTALL_DATADIR}/applications)
-install(FILES ${packaging}/io.github.ressort.ressort.metainfo.xml
-  DESTINATION ${CMAKE_INSTALL_DATADIR}/metainfo)
+set(released 2026-11-28)
+set(metainfo ${packaged}/io.github.ressort.ressort.metainfo.xml)
+configure_file(${packaging}/io.github.ressort.ressort.metainfo.xml.in ${metainfo} @ONLY)
+install(FILES ${metainfo} DESTINATION ${CMAKE_INSTALL_DATADIR}/metainfo)
 install(FILES ${packaging}/ressort.service DESTINATION lib/systemd/user)
 
 # Licence and changelog, as Debian requires.
@@ -31,9 +33,10 @@ string(REGEX MATCH "Permission is hereby granted.*SOFTWARE\\." licence "${licenc
 string(REGEX REPLACE "\n\n" "\n.\n" licence "${licence}")
 string(REGEX REPLACE "\n" "\n " licence "${licence}")
 configure_file(${packaging}/copyright.in ${packaged}/copyright @ONLY)
+execute_process(COMMAND date -u -R -d ${released} OUTPUT_VARIABLE changelog_date)
 file(WRITE ${packaged}/changelog "ressort (${PROJECT_VERSION}) stable; urgency=medium\n\n"
-  "  * The first package.\n\n"
-  " -- ressort <ressort@users.noreply.github.com>  Sat, 28 Nov 2026 12:00:00 +0000\n")
+  "  * First release.\n\n"
+  " -- ressort <ressort@users.noreply.github.com>  ${changelog_date}")
 execute_process(COMMAND gzip -9nkf ${packaged}/changelog)
 install(FILES ${packaged}/copyright ${packaged}/changelog.gz DESTINATION ${documents})
 
@@ -55,8 +58,9 @@ set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ
   GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
-# A program for the processor that built it would not run on others.
-if(RESSORT_LEVELS STREQUAL native)
+# A program for the processor that built it would not run on others. Processors other than x86-64 have
+# one level, which runs on all of them.
+if(RESSORT_LEVELS STREQUAL native AND CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   file(WRITE ${packaged}/refuse.cmake "message(FATAL_ERROR \"This build is for one type of processor, "
     "as app/run makes it. Package a build with -DRESSORT_LEVELS=all.\")\n")
   set(CPACK_PROJECT_CONFIG_FILE ${packaged}/refuse.cmake)
