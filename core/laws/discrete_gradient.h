@@ -56,6 +56,13 @@ static constexpr Scalar<V> tiny_share() {
   return sizeof(Scalar<V>) == 4 ? Scalar<V>(0x1p-22) : Scalar<V>(0x1p-51);
 }
 
+// After a shorter step, relative to the distances, the error of Newton's method is its square,
+// which is less than rounding.
+template <class V>
+static constexpr Scalar<V> last_newton_step() {
+  return sizeof(Scalar<V>) == 4 ? Scalar<V>(0x1p-14) : Scalar<V>(0x1p-34);
+}
+
 inline constexpr int most_newton_steps = 48;
 
 // Returns the f = g(after) that solves after + gamma g(after) = free between `far` and `free`.
@@ -64,7 +71,6 @@ inline constexpr int most_newton_steps = 48;
 // a lane does not depend on the others.
 template <class V, class Force>
 static inline V force_between(V far, V start, V free, V gamma, Force&& g) {
-  constexpr Scalar<V> tiny = tiny_share<V>();
   const V one = V{} + 1;
   V low = select(far < free, far, free);
   V high = select(far < free, free, far);
@@ -79,7 +85,8 @@ static inline V force_between(V far, V start, V free, V gamma, Force&& g) {
     const V newton = after - over / steep;
     const V next =
         select((newton >= low) & (newton <= high) & (steep > V{}), newton, (low + high) / 2);
-    const auto is_moving = absolute(next - after) > tiny * (absolute(after) + absolute(free));
+    const auto is_moving =
+        absolute(next - after) > last_newton_step<V>() * (absolute(after) + absolute(free));
     after = select(live, next, after);
     live = live & is_moving;
   }
@@ -88,10 +95,13 @@ static inline V force_between(V far, V start, V free, V gamma, Force&& g) {
   return here.value - here.slope * over / (one + gamma * here.slope);
 }
 
-// Does the same for a g that never falls, whose largest value in the bracket is g(free).
+// Does the same for a g that never falls, whose largest value in the bracket is g(free). The first
+// step of Newton's method is from there.
 template <class V, class Force>
 static inline V rising_force(V free, V gamma, Force&& g) {
-  return force_between(free - gamma * g(free).value, free, free, gamma, g);
+  const Slope<V> most = g(free);
+  const V way = gamma * most.value;
+  return force_between(free - way, free - way / (1 + gamma * most.slope), free, gamma, g);
 }
 
 // Returns (P(after) - P(before))/step for after = before + step, and its slope. For short steps,
@@ -108,8 +118,12 @@ static inline Slope<V> discrete_gradient(const Potential& potential, V before, V
   const auto is_near = (absolute(step) <= near * far) | (far < nothing);
   const V wide = select(is_near, V{} + 1, step);
   const V quotient = (potential.energy(after) - potential.energy(before)) / wide;
-  return {select(is_near, potential.force(middle), quotient),
-          select(is_near, potential.slope(middle) / 2, (potential.force(after) - quotient) / wide)};
+  const Slope<V> distant{quotient, (potential.force(after) - quotient) / wide};
+  if (!any_of(is_near)) {
+    return distant;
+  }
+  return {select(is_near, potential.force(middle), distant.value),
+          select(is_near, potential.slope(middle) / 2, distant.slope)};
 }
 
 // Returns the passive force of a potential and a damper, whose force is `damping` times the step.

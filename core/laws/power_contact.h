@@ -14,12 +14,22 @@ namespace ressort::laws {
 inline namespace RESSORT_ISA {
 inline namespace RESSORT_ROUNDING {
 
-// The potential K/(P + 1) D^(P + 1).
+// The power of a depth. `const`, because the compiler computes equal calls once and moves constant
+// ones out of loops. It may not do so with std::pow(), which sets errno.
+template <class V>
+[[gnu::const, gnu::noinline]] static V depth_power(V depth, V p) noexcept {
+  return power(depth, p);
+}
+
+// The potential K/(P + 1) D^(P + 1), its force K D^P and its slope K P D^(P - 1).
 template <class V>
 struct PowerWall {
-  V energy(V d) const { return k / (p + 1) * power(depth(d), p + 1); }
-  V force(V d) const { return k * power(depth(d), p); }
-  V slope(V d) const { return select(d > V{}, k * p * power(depth(d), p - 1), V{}); }
+  V energy(V d) const { return k / (p + 1) * depth(d) * depth_power(depth(d), p); }
+  V force(V d) const { return k * depth_power(depth(d), p); }
+  V slope(V d) const {
+    const auto is_in = d > V{};
+    return select(is_in, p * force(d) / select(is_in, d, V{} + 1), V{});
+  }
   static V depth(V d) { return select(d > V{}, d, V{}); }
   V k;
   V p;

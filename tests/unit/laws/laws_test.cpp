@@ -295,6 +295,46 @@ TEST_CASE("the passive force of every law is its steady part and its gradient", 
   });
 }
 
+TEST_CASE("the force of a felt solves its equation to rounding", "[laws]") {
+  // f = (P(after) - P(before))/step with after = free - gamma f. Each energy has about 4 roundings
+  // of u = 2^-53, which the division by the step magnifies. Each depth has 2, which the slope turns
+  // into a force. Newton's method stops after a step of 2^-34 and one more, whose error is below
+  // these. Twice these figures, for the solver and for this check.
+  Random random(7);
+  constexpr double u = 0x1p-53;
+  int touching = 0;
+  for (int i = 0; i < draws; ++i) {
+    const laws::PowerContact<double> felt{.k = random.uniform(0.001, 2.0),
+                                          .p = random.uniform(1.0, 5.0),
+                                          .z = 0.0,
+                                          .t = random.uniform(0.05, 1.0)};
+    laws::LinkState<double> link{.now = random.uniform(-1.0, 1.0),
+                                 .speed = random.uniform(-0.3, 0.3),
+                                 .gamma = random.uniform(0.0, 3.0)};
+    link.free = link.now + link.speed + random.uniform(-0.1, 0.1);
+    const double f = felt.passive(link);
+    const auto depth = [&](double d) { return std::max(0.0, d + felt.t); };
+    const auto energy = [&](double d) {
+      return felt.k / (felt.p + 1.0) * std::pow(depth(d), felt.p + 1.0);
+    };
+    const double before = link.before();
+    const double after = link.free - link.gamma * f;
+    const double step = after - before;
+    const double far = std::fabs(before) + std::fabs(link.free) + 2.0 * felt.t;
+    if (std::fabs(step) < 1e-3 * far) {
+      continue;  // the midpoint rule
+    }
+    const double slope =
+        felt.k * felt.p * std::pow(std::max({depth(before), depth(after)}), felt.p - 1.0);
+    const double rounding =
+        8.0 * u * ((energy(after) + energy(before)) / std::fabs(step) + slope * far + f);
+    CAPTURE(before, link.free, link.gamma, felt.p, f);
+    CHECK(std::fabs(f - (energy(after) - energy(before)) / step) <= rounding);
+    touching += f > 0.0;
+  }
+  CHECK(touching > draws / 4);
+}
+
 TEST_CASE("every law has a finite force if some of its arguments are 0", "[laws]") {
   constexpr double motions[] = {0.0, 1e-9, 1e-3, 1.0, 1e6};
   each_law([&](auto type, Random& random) {
