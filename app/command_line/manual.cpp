@@ -43,7 +43,7 @@ int print_man(const CLI::App& app) {
       version);
   for (const CLI::App* const command : commands_of(app)) {
     std::printf(".SH ressort %s\n", command->get_name().c_str());
-    print_verbatim(command->help());
+    print_verbatim(command->help("ressort"));
   }
   std::printf(
       ".SH EXIT STATUS\n.TP\n0\nsuccess\n.TP\n1\nfailure, such as a full disk or an interrupted\n"

@@ -13,7 +13,7 @@ import websocket
 
 
 class Browser:
-    """One page of one browser of its own, without anything that another has left."""
+    """One page in a browser of its own, with an empty profile."""
 
     def __init__(self, width=1280, height=860, dark=False, mobile=False):
         self.profile = tempfile.mkdtemp(prefix="ressort-browser-")
@@ -80,7 +80,7 @@ class Browser:
         self.ask("Page.navigate", url=address)
 
     def eventually(self, expression, seconds=30):
-        """Until the page says so; only a hang takes so long."""
+        """Waits until the expression is true on the page. Only a page that hangs takes this long."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             try:
@@ -92,7 +92,7 @@ class Browser:
         return False
 
     def complaints(self):
-        """What the browser had to say of the page: errors, and what its policy refused."""
+        """Returns the errors of the page, and the requests that its policy refused."""
         self.evaluate("1")
         found = []
         for event in self.events:
