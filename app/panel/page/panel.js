@@ -384,10 +384,10 @@ on($('find-modes'), 'click', async () => {
     $('modes-text').textContent = (found.linear ? '' : 'Without contacts, bows and plectra. ') +
         'Choose one to see its shape, again to see it play.';
     $('modes').replaceChildren(...found.modes.map(mode => {
-      const by = mode.inputs.map(([number, db]) => `input ${number} ${db === null ? 'not at all' : db + ' dB'}`).slice(0, 3).join(', ');
+      const by = mode.inputs.filter(([, db]) => db !== null).map(([number, db]) => `input ${number} ${db} dB`).slice(0, 3).join(', ');
       const button = make('button', hertz(mode.hz), { 'aria-pressed': 'false' });
       button.append(make('small', `${noteName(mode.hz)}, ${mode.t60_s === null ? 'never decays' : 'T60 ' + mode.t60_s.toPrecision(2) + ' s'}`),
-        make('small', by, { title: 'Level at which each input excites this mode, relative to the mode that it excites most' }));
+        make('small', by || 'not excited by any input', { title: 'Level at which each input excites this mode, relative to the mode that it excites most' }));
       on(button, 'click', () => {
         const on = button.getAttribute('aria-pressed') === 'true';
         document.querySelectorAll('#modes button').forEach(b => b.setAttribute('aria-pressed', 'false'));
