@@ -1,5 +1,7 @@
 #include "app/session/flight/flight_recorder.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
 #include <ctime>
@@ -16,13 +18,14 @@ namespace {
 constexpr std::uint64_t burst_xruns = 3;  // within a second
 constexpr int most_saved = 8;             // flights saved after problems, in one run
 
+// Returns the time and the process, so that programs that play together write different files.
 std::string time_stamp() {
   const std::time_t now = std::time(nullptr);
   std::tm local{};
   localtime_r(&now, &local);
   char text[32];
   std::strftime(text, sizeof text, "%Y%m%d-%H%M%S", &local);
-  return text;
+  return text + ("-" + std::to_string(getpid()));
 }
 
 }  // namespace
