@@ -13,6 +13,7 @@
 #include <set>
 #include <system_error>
 #include <thread>
+#include <utility>
 
 #include "app/control/osc/packet.h"
 #include "app/panel/access.h"
@@ -121,7 +122,10 @@ class News {
 // others.
 class Connections : public httplib::TaskQueue {
  public:
-  void enqueue(std::function<void()> serve) override {
+  // void in cpp-httplib 0.11, a bool that is false if the queue is full in 0.18.
+  using IsQueued = decltype(std::declval<httplib::TaskQueue&>().enqueue({}));
+
+  IsQueued enqueue(std::function<void()> serve) override {
     constexpr std::size_t most = 512;
     std::unique_lock lock(mutex_);
     ended_.wait(lock, [&] { return open_ < most; });
@@ -137,6 +141,7 @@ class Connections : public httplib::TaskQueue {
       lock.unlock();
       serve();
     }
+    return IsQueued(true);
   }
 
   void shutdown() override {

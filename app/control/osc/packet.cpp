@@ -7,11 +7,13 @@
 #include <memory>
 #include <optional>
 #include <string_view>
+#include <type_traits>
 
 namespace ressort::control {
 namespace {
 
-using LoMessage = std::unique_ptr<void, decltype(&lo_message_free)>;
+// lo_message is void* in liblo 0.31 and a pointer to a struct in 0.32.
+using LoMessage = std::unique_ptr<std::remove_pointer_t<lo_message>, decltype(&lo_message_free)>;
 
 using Bytes = std::span<const std::uint8_t>;
 using Fault = std::optional<Error>;
