@@ -405,5 +405,33 @@ TEST_CASE("DC is blocked below 5 Hz, and nothing above 60 Hz changes", "[dampers
   CHECK(nothing.back() == 0.0);
 }
 
+TEST_CASE("the DC blocker filters each channel as it would alone", "[dampers]") {
+  // Two channels are filtered together until one of them is silent. The bits must not depend on
+  // that, nor on the block size.
+  constexpr std::size_t frames = 4096;
+  std::vector<std::vector<double>> sound(3, std::vector<double>(frames));
+  for (std::size_t c = 0; c < sound.size(); ++c) {
+    for (std::size_t n = 100 * c; n < frames; ++n) {
+      const bool is_silent = n / (300 + 70 * c) % 3 == 1;
+      sound[c][n] = is_silent ? 0.0 : std::sin(0.01 * static_cast<double>(n * (c + 1))) + 0.5;
+    }
+  }
+  std::vector<std::vector<double>> alone = sound;
+  for (std::vector<double>& channel : alone) {
+    DcBlocker blocker(48000.0);
+    double* const all = channel.data();
+    blocker.process({&all, 1}, frames);
+  }
+  DcBlocker blocker(48000.0);
+  for (std::size_t at = 0, block = 1; at < frames; at += block, block = block % 97 + 1) {
+    std::vector<double*> channels;
+    for (std::vector<double>& channel : sound) {
+      channels.push_back(channel.data() + at);
+    }
+    blocker.process(channels, std::min(block, frames - at));
+  }
+  CHECK(sound == alone);
+}
+
 }  // namespace
 }  // namespace ressort::dampers_test
