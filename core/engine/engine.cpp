@@ -362,7 +362,8 @@ struct Engine::Player {
   }
 
   std::size_t play(Segment segment) {
-    if (voices.is_idle() && !playing.noise && !audio.find_sound(segment)) {
+    if (voices.is_idle() && !audio.find_sound(segment)) {
+      make_noise(segment, true);
       audio.keep_last_samples(segment);
       since_update = (since_update + segment.frames) % max_block_frames;
       return segment.end();
@@ -373,10 +374,15 @@ struct Engine::Player {
     }
     std::visit([&](auto& b) { play(b, segment); }, bank);
     audio.keep_last_samples(segment);
-    if (playing.noise) {
-      mixing.make_noise(segment);
-    }
+    make_noise(segment, false);
     return segment.end();
+  }
+
+  void make_noise(const Segment& segment, bool is_silent) {
+    if (playing.noise) {
+      mixing.make_noise(segment, std::visit([](const auto& b) { return b.mixer.make_noise; }, bank),
+                        is_silent);
+    }
   }
 
   template <class T>

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 
 #include "core/kernels/isa.h"
@@ -55,10 +56,14 @@ struct AudioInput {
 };
 
 using IsSilent = bool (*)(const double* samples, std::size_t frames);
+// Multiplies a channel by white noise: every `step`-th number of splitmix64() after `state`.
+using MakeNoise = void (*)(double* samples, std::size_t frames, std::uint64_t state,
+                           std::uint64_t step);
 
 template <class T>
 struct Mixer {
   IsSilent is_silent;
+  MakeNoise make_noise;
   // Writes the same row to every frame: value[frame * step + i].
   void (*fill_rows)(const T* row, std::size_t step, std::size_t frames, T* value);
   void (*add_audio)(const AudioInput<T>& input);

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/kernels/kernel.h"
+#include "core/random.h"
 
 namespace ressort::engine::RESSORT_ISA {
 namespace {
@@ -340,9 +341,16 @@ bool mix(const Heard<T>& heard, double bound, const T* gain, double* const* chan
   return true;
 }
 
+void make_noise(double* samples, std::size_t frames, std::uint64_t state, std::uint64_t step) {
+  for (std::size_t n = 0; n < frames; ++n) {
+    std::uint64_t here = state + n * step * splitmix_step;
+    samples[n] *= 0x1p-63 * static_cast<double>(static_cast<std::int64_t>(splitmix64(here)));
+  }
+}
+
 template <class T>
 Mixer<T> mixer_of() {
-  return {is_silent, fill_rows<T>, add_audio<T>, add_voices<T>, mix<T>};
+  return {is_silent, make_noise, fill_rows<T>, add_audio<T>, add_voices<T>, mix<T>};
 }
 
 }  // namespace

@@ -175,12 +175,12 @@ void Mixing::add_frozen(const Program& program, const VoiceGroup& group, const S
 }
 
 // The seed is fixed, so renders repeat.
-void Mixing::make_noise(const Segment& segment) {
-  for (std::size_t n = segment.at; n < segment.end(); ++n) {
-    for (double* const output : segment.outputs) {
-      output[n] *= 0x1p-63 * static_cast<double>(static_cast<std::int64_t>(splitmix64(noise_)));
-    }
+void Mixing::make_noise(const Segment& segment, MakeNoise make, bool is_silent) {
+  const std::size_t count = segment.outputs.size();
+  for (std::size_t c = 0; c < count && !is_silent; ++c) {
+    make(segment.outputs[c] + segment.at, segment.frames, noise_ + c * splitmix_step, count);
   }
+  noise_ += count * segment.frames * splitmix_step;
 }
 
 template void Mixing::add(Bank<float>&, const VoiceGroup&, const Segment&, Voices&, EnergyWatch&);

@@ -35,8 +35,8 @@ class Mixing {
   // Mixes the frozen voices of a kernel.
   void add_frozen(const Program& program, const VoiceGroup& group, const Segment& segment,
                   const Voices& voices, const EnergyWatch& watch) const;
-  // Multiplies the outputs by white noise.
-  void make_noise(const Segment& segment);
+  // Multiplies the outputs by white noise. If they are silent, it only skips these numbers.
+  void make_noise(const Segment& segment, MakeNoise make, bool is_silent);
 
  private:
   template <class Sample>
