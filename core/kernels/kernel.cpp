@@ -23,6 +23,7 @@ void Coefficients<T>::set(std::size_t lane, std::uint32_t c, double wanted, bool
       target[i] = value[i];
     }
   }
+  has_changed = true;
   const std::size_t at = c * width + lane;
   target[at] = static_cast<T>(wanted);
   if (!ramped) {

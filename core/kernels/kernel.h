@@ -52,6 +52,7 @@ class Coefficients {
   std::vector<std::uint32_t> ramping;  // coefficients that are ramping
   std::vector<bool> is_ramping;        // [coefficient]
   std::size_t ramp_frames = 0;         // samples until the ramps end
+  bool has_changed = true;             // since a kernel that needs to know has cleared it
 };
 
 // The ramps as plain pointers, for loops that are compiled once for each instruction set.

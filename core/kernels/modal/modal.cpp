@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <complex>
+#include <utility>
 
 namespace ressort::kernels {
 namespace {
@@ -302,6 +303,7 @@ void ModalKernel<T>::set_state(std::size_t, const double* x, const double* v) {
     state_.ends.v[p] = static_cast<T>(velocity);
   }
   // Links exert no force in the first sample.
+  state_.motion.may_move = true;
   std::fill_n(state_.motion.used, modes_.stiffness.size() + modes_.damping.size() + 1, T(0));
   std::fill_n(state_.inputs.late, modes_.pushes.size(), T(0));
   std::fill_n(state_.ends.force, places + modes_.ends.size(), T(0));
@@ -403,6 +405,7 @@ bool ModalKernel<T>::save(std::size_t, double*, double*) const {
 template <class T>
 void ModalKernel<T>::play(const Block<T>& block) {
   state_.ramps = ramps_of(this->coefficients);
+  state_.motion.may_move |= std::exchange(this->coefficients.has_changed, false);
   step_(program_, modes_, state_, block);
   if (state_.sleep.silence > 0) {
     remember_peaks(block);

@@ -53,6 +53,7 @@ struct ModalShapes {
 // The oscillators, d -= k q + z d, q += d, and how their coefficients change.
 struct ModalMotionPace {
   bool is_stale = true;            // k, z and compliance do not follow from `used`
+  bool may_move = true;            // the coefficients may differ from `used`
   bool is_first = false;           // the first sample of crossed modes
   std::uint32_t fresh_frames = 0;  // since set_state(); up to 2
 };

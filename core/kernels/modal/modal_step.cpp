@@ -85,13 +85,19 @@ struct ModalPlayer {
       s.motion.is_stale = false;
     }
     const bool is_quiet = has_quiet_inputs(first, frames);
-    for (std::size_t n = is_quiet ? first + frames - 1 : first; n < first + frames; ++n) {
+    // Pushes that are one sample late are as constant as still inputs from the second sample on.
+    const std::size_t end = first + frames;
+    const std::size_t different = block.is_still && frames > 2 ? first + 2 : end;
+    for (std::size_t n = is_quiet ? end - 1 : first; n < (is_quiet ? end : different); ++n) {
       fill_amplitudes(n);
     }
     if (is_quiet) {
       s.inputs.pushing = 0;
     } else {
-      find_pushes(first, frames);
+      find_pushes(first, different - first);
+      for (std::size_t n = different; s.inputs.pushing > 0 && n < end; ++n) {
+        std::copy_n(s.inputs.amplitude + (n - 1) * pushes, pushes, s.inputs.amplitude + n * pushes);
+      }
     }
     if (s.inputs.pushing > 0) {
       wake();
@@ -1018,8 +1024,9 @@ struct ModalPlayer {
   }
 
   // Returns the number of samples, from now on, in which the coefficients change.
-  std::size_t moving_frames() const {
-    if (s.ramps.frames > 0) {
+  std::size_t moving_frames() {
+    s.motion.may_move |= s.ramps.frames > 0;
+    if (s.ramps.frames > 0 || !s.motion.may_move) {
       return s.ramps.frames;
     }
     const T* used = s.motion.used;
@@ -1030,7 +1037,8 @@ struct ModalPlayer {
     for (const ModalShare& share : modes.damping) {
       is_same &= *used++ == coefficient(share.coefficient);
     }
-    return is_same && *used == inverse_mass() ? 0 : 1;
+    s.motion.may_move = !is_same || *used != inverse_mass();
+    return s.motion.may_move ? 1 : 0;
   }
 
   // Returns a coefficient some samples ahead.

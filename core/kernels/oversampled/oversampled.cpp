@@ -1,6 +1,7 @@
 #include "core/kernels/oversampled/oversampled.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/kernels/oversampled/oversampled_form.h"
 
@@ -48,11 +49,13 @@ void OversampledKernel<T>::tune(std::size_t lane, const VoicePitch& pitch) {
   const auto times = static_cast<double>(times_);
   if (pitch.warp > 0.0 && pitch.share * times * times <= 1.0) {
     warp_[lane] = static_cast<T>(pitch.warp);
+    this->coefficients.has_changed = true;
     return;
   }
   const bool is_moved =
       is_coarse(lane) && !pitch.is_new && coarse_->save(lane, position_.data(), speed_.data());
   warp_[lane] = T(0);
+  this->coefficients.has_changed = true;
   if (is_moved) {
     for (double& speed : speed_) {
       speed /= times;
@@ -100,6 +103,10 @@ std::size_t OversampledKernel<T>::read_positions(std::size_t lane,
 template <class T>
 void OversampledKernel<T>::refine_coefficients() {
   const std::size_t width = this->width();
+  fine_->coefficients.has_changed = true;
+  if (coarse_) {
+    coarse_->coefficients.has_changed = true;
+  }
   for (std::size_t c = 0; c < factor_.size(); ++c) {
     for (std::size_t lane = 0; lane < width; ++lane) {
       const T value = this->coefficients.value[c * width + lane];
@@ -150,7 +157,9 @@ void OversampledKernel<T>::play(const Block<T>& block) {
   const auto end = warp_.begin() + static_cast<std::ptrdiff_t>(std::min(width, block.lanes));
   const bool has_fine = std::find(warp_.begin(), end, T(0)) != end;
   const bool has_coarse = std::find_if(warp_.begin(), end, [](T w) { return w > T(0); }) != end;
-  refine_coefficients();
+  if (std::exchange(this->coefficients.has_changed, false)) {
+    refine_coefficients();
+  }
   for (std::size_t frame = 0; frame < block.frames;) {
     const bool moves = ramps.frames > 0;
     if (moves) {
