@@ -391,7 +391,7 @@ Result<MidiFile> parse_midi_file(Bytes file) {
 
 void release_all(MidiFile& midi) {
   using enum MidiNumber::Controller;
-  constexpr std::array<std::uint8_t, 2> pedals = {sustain_pedal, sostenuto_pedal};
+  static constexpr std::array<std::uint8_t, 2> pedals = {sustain_pedal, sostenuto_pedal};
   struct Channel {
     std::bitset<128> keys;
     std::bitset<pedals.size()> pressed;
