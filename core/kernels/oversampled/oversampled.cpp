@@ -46,16 +46,15 @@ void OversampledKernel<T>::tune(std::size_t lane, const VoicePitch& pitch) {
   if (!coarse_ || !(pitch.is_new || is_coarse(lane))) {
     return;
   }
+  this->coefficients.has_changed = true;
   const auto times = static_cast<double>(times_);
   if (pitch.warp > 0.0 && pitch.share * times * times <= 1.0) {
     warp_[lane] = static_cast<T>(pitch.warp);
-    this->coefficients.has_changed = true;
     return;
   }
   const bool is_moved =
       is_coarse(lane) && !pitch.is_new && coarse_->save(lane, position_.data(), speed_.data());
   warp_[lane] = T(0);
-  this->coefficients.has_changed = true;
   if (is_moved) {
     for (double& speed : speed_) {
       speed /= times;

@@ -291,7 +291,7 @@ TEST_CASE("a hammer touches a string as long as its equation of motion says, by 
           return depth;
         });
         INFO("key " << key << ", velocity " << velocity << ", " << rate_hz << " Hz");
-        CHECK(found == Approx(expected).epsilon(0.01));
+        CHECK(found == Approx(expected).epsilon(0.006));
         CHECK(player.heap_calls == 0);
       }
       longest_ms = std::max(longest_ms, expected);
