@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <numbers>
 #include <span>
-#include <utility>
 
+#include "core/lanes.h"
 #include "core/rooms.h"
 
 namespace ressort::engine {
@@ -40,40 +42,63 @@ class DcBlocker {
   }
 
  private:
+  using Two = Pack<double, 16>;  // consecutive samples of a channel
+  // The last two samples.
   struct State {
-    bool is_silent(double x) const { return x == 0.0 && in == 0.0; }
-    double in = 0.0;
-    double out = 0.0;
+    Two in{};
+    Two change{};
+    Two out{};  // out[1] is change[1] + pole * out[0].
   };
+
+  // Computes each sample from the last but one, so that a sample waits half as long for another.
+  Two next(State& state, Two in) const {
+    const Two change = in - Two{state.in[1], in[0]};
+    const Two late = pole_ * Two{state.change[1], change[0]};
+    state = {in, change, change + late + pole_ * pole_ * state.out};
+    return state.out;
+  }
+
+  static bool is_zero(const double* samples, std::size_t frames) {
+    std::uint64_t bits = 0;
+    for (std::size_t n = 0; n < frames; ++n) {
+      bits |= std::bit_cast<std::uint64_t>(samples[n]) << 1;
+    }
+    return bits == 0;
+  }
 
   void filter(double* channel, std::size_t frames, State& kept) const {
     State state = kept;
-    std::size_t n = 0;
-    while (n < frames && state.out == 0.0 && state.is_silent(channel[n])) {
-      ++n;
+    if (state.out[1] == 0.0 && state.in[1] == 0.0 && is_zero(channel, frames)) {
+      return;
     }
-    for (; n < frames; ++n) {
+    for (std::size_t n = 0; n < frames; ++n) {
       const double x = channel[n];
-      const bool is_silent = state.is_silent(x);
-      state.out = x - state.in + (is_silent ? quick_pole_ : pole_) * state.out;
-      state.out = is_silent && std::fabs(state.out) < nothing ? 0.0 : state.out;
-      state.in = x;
-      channel[n] = state.out;
+      double change = 0.0;
+      if (x == 0.0 && state.in[1] == 0.0) {
+        const double y = quick_pole_ * state.out[1];
+        channel[n] = std::fabs(y) < nothing ? 0.0 : y;
+        state.out[0] = channel[n] / pole_;
+      } else {
+        change = x - state.in[1];
+        channel[n] = change + pole_ * state.change[1] + pole_ * pole_ * state.out[0];
+        state.out[0] = state.out[1];
+      }
+      state.in[1] = x;
+      state.change[1] = change;
+      state.out[1] = channel[n];
     }
     kept = state;
   }
 
-  // Filters two channels at once, because every sample waits for the one before it, until one of
-  // them is silent. Returns the number of frames.
+  // Filters two channels at once, because samples wait for those before them, until one of them may
+  // be silent. Returns the number of frames.
   std::size_t filter_pair(double* left, double* right, std::size_t frames, State* states) const {
     State l = states[0];
     State r = states[1];
     std::size_t n = 0;
-    for (; n < frames && !l.is_silent(left[n]) && !r.is_silent(right[n]); ++n) {
-      l.out = left[n] - l.in + pole_ * l.out;
-      r.out = right[n] - r.in + pole_ * r.out;
-      l.in = std::exchange(left[n], l.out);
-      r.in = std::exchange(right[n], r.out);
+    for (; n + 2 <= frames && left[n] * right[n] != 0.0; n += 2) {
+      store(left + n, next(l, load<Two>(left + n)));
+      store(right + n, next(r, load<Two>(right + n)));
     }
     states[0] = l;
     states[1] = r;
