@@ -94,6 +94,71 @@ struct Ramp {
   T increment = 0;
 };
 
+// The numbers that move_ahead() keeps from one sample to the next.
+template <class S, std::size_t packs>
+struct Ahead {
+  using V = typename S::V;
+  using T = typename S::Number;
+
+  explicit Ahead(const ShortBody<V, packs>& body) {
+    each_below<packs>([&](auto i) { late[i] = body.x[i] - body.v[i]; });
+  }
+  void take(const ShortBody<V, packs>& body, const FoldedChain& chain, const S& s) {
+    each_below<packs>([&](auto i) {
+      position[i] = body.inverse_mass[i] * all<V>(s.held[0]);
+      speed[i] = body.inverse_mass[i] * all<V>(s.held[0] + s.held[1]);
+      own[i] = T(1) - T(2) * speed[i];
+    });
+    left_v = all<V>(s.bodies[chain.left + S::lanes]);
+    left_x = all<V>(s.bodies[chain.left]) - left_v;
+    right_v = all<V>(s.bodies[chain.right + S::lanes]);
+    right_x = all<V>(s.bodies[chain.right]) - right_v;
+  }
+
+  V late[packs];      // positions one sample ago
+  V position[packs];  // k / m
+  V speed[packs];     // (k + z) / m
+  V own[packs];       // 1 - 2 (k + z) / m
+  V left_x;
+  V left_v;
+  V right_x;
+  V right_v;
+};
+
+// Does the same as move_short_chain() without sites, by k x[n] + z v[n] = k x[n-1] + (k + z) v[n].
+// A sample then waits for the one before it for less than half of the time.
+template <class S, std::size_t packs>
+void move_ahead(ShortBody<typename S::V, packs>& body, Ahead<S, packs>& ahead) {
+  using V = typename S::V;
+  const auto others = std::make_index_sequence<S::lanes - 1>{};
+  V x_before = up(ahead.left_x, ahead.late[packs - 1], others);
+  V v_before = up(ahead.left_v, body.v[packs - 1], others);
+  const V x_end = down(ahead.late[0], ahead.right_x, others);
+  const V v_end = down(body.v[0], ahead.right_v, others);
+  V v[packs];
+  each_below<packs>([&](auto i) {
+    V x_after = x_end;
+    V v_after = v_end;
+    if constexpr (i + 1 < packs) {
+      x_after = ahead.late[i + 1];
+      v_after = body.v[i + 1];
+    }
+    const V bend = ahead.position[i] * ((x_before + x_after) - ahead.late[i] * 2);
+    v[i] = (bend + ahead.own[i] * body.v[i]) + ahead.speed[i] * (v_before + v_after);
+    x_before = ahead.late[i];
+    v_before = body.v[i];
+  });
+  each_below<packs>([&](auto i) {
+    ahead.late[i] = body.x[i];
+    body.v[i] = v[i];
+    body.x[i] += v[i];
+  });
+}
+
+// In single precision the rounding errors of move_ahead() would be too large.
+template <class T, std::size_t packs>
+constexpr bool goes_ahead = sizeof(T) == sizeof(double) && packs <= 3;
+
 // Steps a block of a chain with no other links than those that hold its ends. All of its data is in
 // registers, which saves a quarter of the time.
 template <class S, std::size_t packs, class T>
@@ -107,29 +172,51 @@ template <class S, std::size_t packs, class T>
   const T* velocity = block.velocity;
   T* outputs = block.outputs;
   ShortBody<typename S::V, packs> here = body;
-  for (std::size_t left = block.frames, arrives = block.frames + 1 - ramps.frames; left > 0;
-       --left) {
-    k.advance(left == arrives);
-    z.advance(left == arrives);
-    move_short_chain<false>(here, chain, nullptr, s);
-    each_below<packs>([&](auto i) {
-      if ((read >> i & 1) != 0) {
-        pairs[2 * i] = here.x[i];
+  Ahead<S, packs> ahead(here);
+  const auto step = [&]<bool moves>(std::size_t from, std::size_t end) {
+    if constexpr (goes_ahead<T, packs>) {
+      ahead.take(here, chain, s);
+    }
+    for (std::size_t frame = from; frame < end; ++frame) {
+      if constexpr (moves) {
+        k.advance(frame + 1 == ramps.frames);
+        z.advance(frame + 1 == ramps.frames);
       }
-    });
-    for (const PlacedInput& input : s.positions) {
-      s.bodies[input.place] = value[input.index];
-      s.bodies[input.place + S::lanes] = velocity[input.index];
+      if constexpr (goes_ahead<T, packs>) {
+        if (moves) {
+          ahead.take(here, chain, s);
+        }
+        move_ahead(here, ahead);
+      } else {
+        move_short_chain<false>(here, chain, nullptr, s);
+      }
+      each_below<packs>([&](auto i) {
+        if (packs <= 3 || (read >> i & 1) != 0) {
+          pairs[2 * i] = here.x[i];
+        }
+      });
+      if constexpr (moves) {
+        for (const PlacedInput& input : s.positions) {
+          s.bodies[input.place] = value[input.index];
+          s.bodies[input.place + S::lanes] = velocity[input.index];
+        }
+        s.held[0] = k.value;
+        s.held[1] = z.value;
+        value += program.inputs.size();
+        velocity += program.inputs.size();
+      }
+      for (const HeardPosition& output : s.heard_positions) {
+        outputs[output.index] = s.bodies[output.place];
+      }
+      outputs += program.outputs.size();
     }
-    s.held[0] = k.value;
-    s.held[1] = z.value;
-    for (const HeardPosition& output : s.heard_positions) {
-      outputs[output.index] = s.bodies[output.place];
-    }
-    outputs += program.outputs.size();
-    value += program.inputs.size();
-    velocity += program.inputs.size();
-  }
+  };
+  // The first sample's springs can differ from those of the next.
+  const std::size_t moving = s.positions.first != s.positions.last
+                                 ? block.frames
+                                 : std::min(std::max<std::size_t>(1, ramps.frames), block.frames);
+  step.template operator()<true>(0, moving);
+  step.template operator()<false>(moving, block.frames);
   ramps.value[chain.springs[0]] = k.value;
   ramps.value[chain.springs[1]] = z.value;
   body = here;
@@ -173,7 +260,9 @@ template <class S, std::size_t packs, class T>
   T inverse_mass = s.coefficient[chain.mass.inverse_mass];
   fill_inverse_masses(body, chain, s);
   std::size_t frame = 0;
-  if (!has_sites && !has_others && program.audio_coefficients.empty() &&
+  const bool are_ends_held = chain.left != nowhere && chain.right != nowhere;
+  if (!has_sites && !has_others &&
+      (are_ends_held || !goes_ahead<T, packs>)&&program.audio_coefficients.empty() &&
       are_springs_all_that_ramps(chain, ramps)) {
     step_alone(program, chain, read, body, pairs, ramps, block, s);
     frame = frames;
