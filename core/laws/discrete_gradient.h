@@ -152,10 +152,14 @@ static inline V share_inside(const LinkState<V>& m, V t) {
   return (share_inside(m.before() + t, depth) + share_inside(depth, m.free + t)) / 2;
 }
 
-// Returns true if the link may touch in any lane. Otherwise its force is 0.
+// Returns the lanes in which the link may touch. In others its force is 0.
+template <class V>
+static inline auto touching_lanes(const LinkState<V>& m, V t) {
+  return (m.before() > -t) | (m.now > -t) | (m.free > -t);
+}
 template <class V>
 static inline bool may_touch(const LinkState<V>& m, V t) {
-  return any_of((m.before() > -t) | (m.now > -t) | (m.free > -t));
+  return any_of(touching_lanes(m, t));
 }
 
 // Returns the passive force of a friction law. Its `grip(wanted, last, half)` is the friction f(v)

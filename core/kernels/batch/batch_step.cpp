@@ -1,4 +1,5 @@
 // The loops of the batch kernel, compiled for each instruction set.
+#include <array>
 #include <type_traits>
 
 #include "core/kernels/batch/batch_packs.h"
@@ -60,6 +61,7 @@ class PassiveLinks {
   PassiveLinks(const Program& program, const Packs<V>& packs, BatchState<T>& state)
       : program_(program), packs_(packs), state_(state), is_any_(!state.passive.links.empty()) {}
 
+  bool is_any() const { return is_any_; }
   void remember() const {
     if (is_any_) {
       remember_all();
@@ -71,37 +73,62 @@ class PassiveLinks {
     }
   }
 
-  // Returns whether may_act() can be false: in no lane is this the first sample, and all links have
-  // a zone.
+  // Returns whether a Watch is possible: in no lane is this the first sample, and all links have a
+  // zone.
   bool may_rest() const {
     bool are_awake = true;
     for (std::size_t pack = 0; pack < packs_.count; ++pack) {
       are_awake &= !any_of(body(pack).is_awake <= V{});
     }
     const std::vector<PassiveLink>& links = state_.passive.links;
-    return are_awake && std::all_of(links.begin(), links.end(), [](const PassiveLink& link) {
+    return are_awake && links.size() <= Watch::most &&
+           std::all_of(links.begin(), links.end(), [](const PassiveLink& link) {
              return link.zone == Zone::near || link.zone == Zone::below;
            });
   }
-  // Returns whether any link can act in this sample, after masses and inputs have moved. Otherwise
-  // stores the distances for the next sample.
-  [[gnu::always_inline]] bool may_act() const {
-    const std::vector<PassiveLink>& links = state_.passive.links;
-    bool acts = false;
-    for (std::size_t pack = 0; pack < packs_.count; ++pack) {
-      const Passive<V> own = body(pack);
-      V* row = memory(pack);
-      for (const PassiveLink& link : links) {
-        const laws::LinkState<V> state{
-            .now = row[0], .speed = row[1], .free = own.distance(link.ends)};
-        acts |= RESSORT_ISA::may_act(link, state, own);
-        row[0] = state.free;
-        row[1] = own.speed(link.ends);
-        row += passive_rows;
+
+  // Watches whether any link can act, after masses and inputs have moved.
+  class Watch {
+   public:
+    static constexpr std::size_t most = 3;
+
+    explicit Watch(const PassiveLinks& links) {
+      for (std::size_t pack = 0; pack < links.packs_.count; ++pack) {
+        const Passive<V> own = links.body(pack);
+        const V* row = links.memory(pack);
+        for (const PassiveLink& link : links.state_.passive.links) {
+          rows_[count_++] = {
+              own.nodes + link.ends.a, own.nodes + link.ends.b, own.all[link.reach], row[0], row[1],
+              link.zone == Zone::below};
+          row += passive_rows;
+        }
       }
     }
-    return acts;
-  }
+    [[gnu::always_inline]] void look() {
+      for (std::size_t i = 0; i < count_; ++i) {
+        Row& row = rows_[i];
+        const laws::LinkState<V> state{
+            .now = row.now, .speed = row.speed, .free = row.a->x - row.b->x};
+        acts_ |= acting_lanes(row.is_below, state, row.reach);
+        row.now = state.free;
+        row.speed = row.a->v - row.b->v;
+      }
+    }
+    bool has_acted() const { return any_of(acts_); }
+
+   private:
+    struct Row {
+      const Node<V>* a;
+      const Node<V>* b;
+      V reach;
+      V now;
+      V speed;
+      bool is_below;
+    };
+    std::size_t count_ = 0;
+    std::array<Row, 3 * most> rows_;
+    decltype(V{} < V{}) acts_{};
+  };
 
  private:
   Passive<V> body(std::size_t pack) const {
@@ -199,7 +226,7 @@ class Holder {
   // state as before, if a passive link may act.
   template <std::uint32_t P, class Type, class Passives>
   [[gnu::always_inline]] bool stay(Rows<V> rows, std::size_t frames,
-                                   const Passives* passive) const {
+                                   const Passives& passives) const {
     V x[P][N];
     V v[P][N];
     V f[P][N];
@@ -211,10 +238,9 @@ class Holder {
         f[p][i] = packs_.nodes(p)[i].force;
       });
     });
-    if (passive != nullptr) {
-      each<P>([&](auto p) { std::copy_n(packs_.nodes(p), table_.nodes, before[p]); });
-      passive->remember();
-    }
+    each<P>([&](auto p) { std::copy_n(packs_.nodes(p), table_.nodes, before[p]); });
+    passives.remember();
+    typename Passives::Watch watch(passives);
     const std::uint32_t anchored = table_.anchored;
     const std::uint32_t linked = table_.linked;
     const std::uint32_t pushed = table_.pushed;
@@ -236,9 +262,11 @@ class Holder {
       if (!rows.is_still || frame == 0) {
         take_positions(program_, packs_, rows);
       }
-      if (passive != nullptr) {
+      if (passives.is_any()) {
         each<P>([&](auto p) { each<N>([&](auto i) { packs_.nodes(p)[i].v = v[p][i]; }); });
-        if (passive->may_act()) {
+        watch.look();
+        // A test in every sample would cost as much as the sample.
+        if ((frame % 8 == 0 || frame + 1 == frames) && watch.has_acted()) {
           each<P>([&](auto p) { std::copy_n(before[p], table_.nodes, packs_.nodes(p)); });
           return false;
         }
@@ -417,10 +445,8 @@ void hold_in_registers(const Program& program, const Batch& batch, const BatchTa
     const Packs<V> some = packs.some(first, P);
     const PassiveLinks passive(program, some, state);
     const Holder<V, N, is_alike> holder(program, batch, table, some);
-    const bool has_passive = !state.passive.links.empty();
-    if ((has_passive && !passive.may_rest()) ||
-        !holder.template stay<P, Type>(rows.from(first), frames,
-                                       has_passive ? &passive : nullptr)) {
+    if ((passive.is_any() && !passive.may_rest()) ||
+        !holder.template stay<P, Type>(rows.from(first), frames, passive)) {
       take_turns(holder, program, some, passive, rows.from(first), frames);
     }
   };

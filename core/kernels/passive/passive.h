@@ -35,21 +35,26 @@ static inline void remember(const PassiveTables& tables, V* memory, const Body& 
   }
 }
 
+// Returns the lanes in which a link can exert a force, by its distance. Its zone is `below` or
+// `near`.
+template <class V>
+static inline decltype(V{} < V{})
+    acting_lanes(bool is_below, const laws::LinkState<V>& state, V reach) {
+  if (is_below) {
+    return laws::touching_lanes(state, reach);
+  }
+  const V before = state.before();
+  const V way = absolute(state.free - before) + absolute(state.now - before);
+  return absolute(state.now) < reach + way;
+}
+
 // Returns whether a link can exert a force in any lane. Laws with a limited zone are tested by
 // distance, which is faster than evaluating them.
 template <class V, class Body>
 static inline bool may_act(const PassiveLink& link, const laws::LinkState<V>& state,
                            const Body& body) {
-  if (link.zone != Zone::near && link.zone != Zone::below) {
-    return true;
-  }
-  const V reach = body.coefficients()[link.reach];
-  if (link.zone == Zone::below) {
-    return laws::may_touch(state, reach);
-  }
-  const V before = state.before();
-  const V way = absolute(state.free - before) + absolute(state.now - before);
-  return any_of(absolute(state.now) < reach + way);
+  return (link.zone != Zone::near && link.zone != Zone::below) ||
+         any_of(acting_lanes(link.zone == Zone::below, state, body.coefficients()[link.reach]));
 }
 
 // Returns whether any link of a cluster can act; often nothing touches.
