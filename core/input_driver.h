@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <numbers>
 
 #include "core/noise.h"
 #include "core/raised_cosine.h"
@@ -71,6 +72,20 @@ class alignas(64) InputDriver {
       blow_pulse_ = pulse;
       blow_left_ = pulse.count;
     }
+  }
+
+  // Lets a blow that has not begun choose its direction by the motion of its place. `cycles`:
+  // cycles per sample of the lowest mode there.
+  void wait_for_motion(double cycles) { cycles_ = cycles; }
+  bool waits_for_motion() const { return cycles_ > 0.0 && blow_left_ == blow_pulse_.count; }
+  // Turns the blow so that it adds energy to a mode with this position and velocity per sample: the
+  // velocity in the middle of a blow of length T is v cos(w T / 2) - x w sin(w T / 2).
+  void follow_motion(double position, double velocity) {
+    const double omega = 2.0 * std::numbers::pi * cycles_;
+    const double half = 0.5 * omega * static_cast<double>(blow_pulse_.count);
+    const double middle = velocity * std::cos(half) - position * omega * std::sin(half);
+    blow_ = middle * blow_ < 0.0 ? -blow_ : blow_;
+    cycles_ = 0.0;
   }
 
   // Adds a constant force for `frames` samples.
@@ -230,7 +245,8 @@ class alignas(64) InputDriver {
   double target_ = 0.0;
   double speed_ = 0.0;
   double pole_ = 0.0;
-  double blow_ = 0.0;  // sum of the current pulse
+  double blow_ = 0.0;    // sum of the current pulse
+  double cycles_ = 0.0;  // of the motion that its direction follows; 0: none
   RaisedCosine blow_pulse_;
   double held_ = 0.0;
   double burst_ = 0.0;       // initial rms

@@ -72,10 +72,11 @@ struct Stroke {
   double middle = 0.0;      // position of the input in the model; 0 for a force
   double rate_ratio = 1.0;  // 44 100 Hz to the engine's rate
   double rate_hz = 44100.0;
-  double pitch = 1.0;     // the voice's pitch by the written pitch; 1 unless the control follows it
-  double share = 1.0;     // factor on the force of a blow
-  double hardness = 0.0;  // added to the amount for the length of a blow
-  bool bare = false;      // nothing is smoothed
+  double pitch = 1.0;  // the voice's pitch by the written pitch; 1 unless the control follows it
+  double share = 1.0;  // factor on the force of a blow
+  double string_hz = 0.0;  // pitch of what a blow strikes, if it may ring; 0: unknown
+  double hardness = 0.0;   // added to the amount for the length of a blow
+  bool bare = false;       // nothing is smoothed
   std::uint64_t seed = 0;  // differs from note to note and from input to input
   // Results, set by the gesture.
   std::optional<double> rest;      // position at which drivers of new voices start from now on

@@ -23,6 +23,16 @@ Stroke stroke_of(const Control& control, double amount = 1.0, double key = middl
   return {.amount = amount, .has_control = true, .settings = control.settings_on(key)};
 }
 
+// Returns the key of the string that a control with fixed tuning strikes. A control that is open to
+// lower or to higher keys plays the string of its last or first key.
+double string_of(const Control& control, double key) {
+  const bool is_open_below = control.lowest_key == 0;
+  const bool is_open_above = control.highest_key == 127;
+  return is_open_below == is_open_above ? key
+         : is_open_below                ? control.highest_key
+                                        : control.lowest_key;
+}
+
 double key_of(const Voice& voice) {
   return voice.has_key ? voice.key : middle_c;
 }
@@ -149,6 +159,9 @@ void Gestures::play(const GestureRow& gesture, std::size_t input, Stroke stroke,
     stroke.share = stroke.level() / stroke.settings.highest_level();
   }
   gesture.play(driver(*latest, input), stroke);
+  if (stroke.string_hz > 0.0 && !voice.is_new) {
+    driver(*latest, input).wait_for_motion(stroke.string_hz / machine_.rate_hz);
+  }
   if (stroke.settings.has_level && stroke.amount != 0.0) {
     keyboard.set_strength(voice, stroke.level() / stroke.share);
   }
@@ -162,9 +175,12 @@ void Gestures::play(const GestureRow& gesture, std::size_t input, Stroke stroke,
 
 void Gestures::play(const Control& control, double amount, const Scope& scope, Keyboard& keyboard,
                     Parameters& parameters, double key, std::optional<std::size_t> lane) {
-  const Stroke stroke = stroke_of(control, amount, key);
+  Stroke stroke = stroke_of(control, amount, key);
   if (control.gesture == Gesture::parameter) {
     return parameters.set(control.target, stroke.mapped());
+  }
+  if (row_of(control.gesture).is_blow && playing_.tuning == Tuning::fixed) {
+    stroke.string_hz = playing_.keys_hz[static_cast<std::size_t>(string_of(control, key))];
   }
   play(row_of(control.gesture), control.target, stroke, scope, lane, keyboard, parameters);
 }
@@ -342,6 +358,15 @@ void Gestures::fill_inputs(Bank<T>& bank, const VoiceGroup& group, std::size_t f
       T* value = bank.value.data() + i * part.width + lane - group.first;
       T* velocity = bank.velocity.data() + i * part.width + lane - group.first;
       if (slot.is_force) {
+        if (mover.waits_for_motion()) {
+          std::array<T, 64> x;
+          std::array<T, 64> v;
+          if (part.width <= x.size() &&
+              part.of(lane).read(std::span(&slot.node, 1), x.data(), v.data())) {
+            mover.follow_motion(static_cast<double>(x[lane % part.width]),
+                                static_cast<double>(v[lane % part.width]));
+          }
+        }
         for (std::size_t n = 0; n < frames; ++n) {
           value[n * step] = static_cast<T>(mover.next_force().value);
         }

@@ -1,6 +1,7 @@
 // Properties of a note besides its pitch: loudness, brightness and the action of its damper.
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "core/engine/dc_blocker.h"
 #include "tests/support/catch.h"
@@ -318,6 +319,36 @@ TEST_CASE("a soft strike takes nothing from a louder note of its key", "[dampers
         std::max(most_db, gain_db - 20.0 * std::log10(1.0 + std::sqrt(power({soft}) / alone)));
   }
   CHECK(most_db == Approx(0.0).margin(0.3));  // amplitudes add up in phase
+}
+
+// Returns the sum of squares of a part of the sound.
+double power_from(const std::string& text, const Preset& preset, const std::vector<Event>& events,
+                  std::size_t from, std::size_t to) {
+  Player player(text, preset);
+  player.run(to, events);
+  return std::accumulate(player.y().begin() + static_cast<std::ptrdiff_t>(from), player.y().end(),
+                         0.0, [](double sum, double y) { return sum + y * y; });
+}
+
+// With fixed tuning a soft blow goes with the motion of what it strikes, so both energies add up
+// and the correlation is not negative. A blow of half a period at any phase.
+TEST_CASE("a soft blow on a network with fixed tuning adds to its motion", "[dampers]") {
+  const std::string text = "@m osc 1. 0.0014 0.00001 0. 0.\n@in1 frcInput @m\n@out1 posOutput @m\n";
+  Preset preset = struck(1);
+  preset.keyboard = false;
+  preset.controls[0].longest_ms = preset.controls[0].shortest_ms = 1.9;
+  const double period = 2.0 * std::numbers::pi / std::sqrt(0.0014);
+  for (int eighth = 0; eighth < 8; ++eighth) {
+    const auto at = static_cast<std::uint32_t>(6000.0 + period * eighth / 8.0);
+    const Event loud = note_on(0, 60, 1.0);
+    const Event soft = note_on(at, 60, 0.3);
+    const std::size_t from = at + 200;
+    const double alone = power_from(text, preset, {loud}, from, from + 9000);
+    const double single = power_from(text, preset, {soft}, from, from + 9000);
+    const double both = power_from(text, preset, {loud, soft}, from, from + 9000);
+    INFO(eighth);
+    CHECK(both > 0.98 * (alone + single));
+  }
 }
 
 TEST_CASE("a long blow gives as much momentum as a short one", "[dampers]") {
