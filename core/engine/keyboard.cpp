@@ -104,7 +104,12 @@ Press Keyboard::press_key(int key, double velocity, std::uint8_t channel, double
   if (mono != nullptr && mono->held) {
     replace(*mono);
   }
-  const Voice* const kept = is_fixed ? nullptr : replace_voices_of(key, channel, velocity);
+  Voice* const kept = is_fixed ? nullptr : replace_voices_of(key, channel, velocity);
+  if (kept != nullptr && !rings_on_) {
+    voices.set_latest(*kept);
+    attach(*kept, key, channel);
+    return Press::moves;
+  }
   Voice& latest = voices[voices.latest()];
   const bool stays = is_fixed && !latest.fading && latest.is_undamped();
   Voice& voice = stays ? latest : voices.take_lane();
@@ -208,16 +213,17 @@ void Keyboard::replace(Voice& voice) const {
 
 // A repeated key damps its earlier voices, as a finger or hammer touches the same string. But a
 // softer strike must not silence a string that rings: the loudest voice rings on beside the new
-// one, and both end with the key. A voice that is bowed or held ends in any case, because its key
-// begins a new stroke. A new voice has a new hammer: a second blow on one that has flown away would
-// add to its speed. Returns the voice that rings on, or null.
-const Voice* Keyboard::replace_voices_of(int key, std::uint8_t channel, double velocity) {
+// one, and both end with the key. A voice that is bowed or held ends, because its key begins a new
+// stroke. If a pedal holds it, it goes on alone. A new voice has a new hammer: a second blow on one
+// that has flown away would add to its speed. Returns the voice that rings on, or null.
+Voice* Keyboard::replace_voices_of(int key, std::uint8_t channel, double velocity) {
   const auto is_earlier = [&](const Voice& voice) {
     return voice.is_live() && voice.has_key && !voice.is_replaced && voice.key == key &&
            voice.channel == channel;
   };
   const auto may_ring_on = [&](const Voice& voice) {
-    return rings_on_ && is_earlier(voice) && voice.velocity > velocity && voice.level > quiet_level;
+    return (rings_on_ || voice.sustained) && is_earlier(voice) && voice.velocity > velocity &&
+           voice.level > quiet_level;
   };
   Voice* const kept = voices.least_of(
       may_ring_on, [](const Voice& a, const Voice& b) { return a.level > b.level; });

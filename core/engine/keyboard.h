@@ -26,7 +26,7 @@ enum class Press : std::uint8_t {
   silent,   // none: the key has no playable pitch
   starts,   // the voice starts
   strikes,  // the voice sounds already and is excited again
-  moves,    // the voice only changes its pitch (legato)
+  moves,    // the voice sounds on, maybe at another pitch (legato, pedal)
 };
 
 struct HeldKey {
@@ -139,7 +139,7 @@ class Keyboard {
   void attach(Voice& voice, int key, std::uint8_t channel);
   Voice* latest_on(std::uint8_t channel);
   void hold(Voice& voice) const;
-  const Voice* replace_voices_of(int key, std::uint8_t channel, double velocity);
+  Voice* replace_voices_of(int key, std::uint8_t channel, double velocity);
   void replace(Voice& voice) const;
   void move_to(Voice& voice, int key, double own_hz, bool glides, double highest_factor);
   void glide_from(Voice& voice, double frequency_hz) const;

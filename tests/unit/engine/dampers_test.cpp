@@ -351,6 +351,34 @@ TEST_CASE("a soft blow on a network with fixed tuning adds to its motion", "[dam
   }
 }
 
+// A softer stroke under the pedal leaves the louder one as it is.
+TEST_CASE("a bow that a pedal holds goes on when its key is pressed softer", "[dampers]") {
+  const std::string text =
+      "@in1 posInput 0.\n@m osc 1. 0.01 0.001 0. 0.\n@b nlBow @in1 @m 0.01 0.001\n"
+      "@out1 posOutput @in1\n";
+  Preset preset;
+  preset.voices = 4;
+  preset.damper_s = 0.1;
+  preset.controls.push_back({.target = "in1", .gesture = Gesture::bow, .low = 0.0, .high = 0.01});
+  const std::vector<Event> loud = {controller(0, 64, 1.0), note_on(10, 60, 1.0),
+                                   note_off(4000, 60)};
+  std::vector<Event> again = loud;
+  again.push_back(note_on(6000, 60, 0.2));
+  Player alone(text, preset);
+  alone.run(12000, loud);
+  Player both(text, preset);
+  both.run(12000, again);
+  REQUIRE(peak(std::span(alone.y()).last(1000)) > 1e-4);
+  CHECK(both.y() == alone.y());
+  // The stroke ends with the key and the pedal; a harder one replaces it.
+  both.run(20000, {note_off(0, 60), controller(0, 64, 0.0)});
+  CHECK(peak(std::span(both.y()).last(1000)) == 0.0);
+  Player harder(text, preset);
+  again.back() = note_on(6000, 60, 1.0);
+  harder.run(12000, again);
+  CHECK(harder.y() != alone.y());
+}
+
 TEST_CASE("a long blow gives as much momentum as a short one", "[dampers]") {
   // A free mass of 1 moves at F / M per sample after the blow, as its position shows.
   const std::string text = "@m mass 1 0 0\n@in1 frcInput @m\n@out1 posOutput @m\n";
