@@ -64,6 +64,19 @@ std::vector<SharedParameter> shared_parameters(const Instrument& voices, const C
   return shared;
 }
 
+// Returns the beginning of an impulse response, as voices are compared by it.
+std::vector<double> summed_by_step(std::span<const double> response, double rate_hz) {
+  constexpr double longest_s = 0.05;
+  const std::size_t step = engine::compared_step(rate_hz);
+  const auto longest = static_cast<std::size_t>(longest_s * rate_hz);
+  std::vector<double> sums;
+  for (std::size_t at = 0; at + step <= std::min(longest, response.size()); at += step) {
+    const auto from = response.begin() + static_cast<std::ptrdiff_t>(at);
+    sums.push_back(std::accumulate(from, from + static_cast<std::ptrdiff_t>(step), 0.0));
+  }
+  return sums;
+}
+
 }  // namespace
 
 Result<std::optional<Compiled>> compile_body(const CompileRequest& request, const Network& network,
@@ -151,12 +164,16 @@ BodyGain measure_gain(Compiled& body, const Progress& progress) {
       std::ceil(lowest_hz / machine.rate_hz * static_cast<double>(frames)));
   // [output][bin] sum over the inputs
   std::vector<std::vector<double>> gains(count, std::vector<double>(bins.size()));
+  BodyGain most{0.0, 0.0, {}};
   for (const ModelInput& input : machine.inputs) {
     const auto channel = static_cast<std::size_t>(input.number - 1);
     double impulse = first_impulse;
     if (const double peak = play(channel, impulse); peak > 0.0 && peak < audible) {
       impulse /= peak;
       play(channel, impulse);
+    }
+    if (most.response.empty()) {
+      most.response = summed_by_step(heard.front(), machine.rate_hz);
     }
     for (std::size_t c = 0; c < count; ++c) {
       fourier.forward(heard[c], bins);
@@ -165,7 +182,6 @@ BodyGain measure_gain(Compiled& body, const Progress& progress) {
           [&](std::complex<double> bin, double sum) { return sum + std::abs(bin) / impulse; });
     }
   }
-  BodyGain most{0.0, 0.0};
   for (const std::vector<double>& gain : gains) {
     double squares = 0.0;
     for (std::size_t bin = first_bin; bin < gain.size(); ++bin) {

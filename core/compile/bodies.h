@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "core/compile/compile.h"
 
@@ -20,8 +21,9 @@ Result<std::optional<Compiled>> compile_body(const CompileRequest& request, cons
 
 // Gain from the voices' outputs, all in phase, to an output of the last body.
 struct BodyGain {
-  double largest = 1.0;  // at any frequency from 20 Hz
-  double mean = 1.0;     // for white noise
+  double largest = 1.0;                  // at any frequency from 20 Hz
+  double mean = 1.0;                     // for white noise
+  std::vector<double> response = {1.0};  // see Playing::body_response
 };
 
 // Measures the gain by the response to impulses of up to 1.5 s. Takes about a quarter of a second

@@ -218,6 +218,7 @@ Result<Compiled> compile_by_stages(const CompileRequest& request) {
     playing.share = options.share;
     playing.body_gain = body_gain.largest;
     playing.mean_body_gain = body_gain.mean;
+    playing.body_response = body_gain.response;
     return playing;
   };
   std::optional<double> factor = 1.0;  // factor on the preset's gain

@@ -11,6 +11,7 @@
 
 #include "core/engine/audio_inputs.h"
 #include "core/engine/body.h"
+#include "core/engine/comparison.h"
 #include "core/engine/energy_watch.h"
 #include "core/engine/gestures.h"
 #include "core/engine/keyboard.h"
@@ -64,7 +65,8 @@ struct Engine::Player {
         audio(machine, playing, std::visit([](const auto& b) { return b.mixer.is_silent; }, bank)),
         watch(machine, playing, voices.size()),
         levels(machine, playing),
-        mixing(playing, machine.rate_hz, keyboard.voices.size()),
+        mixing(playing),
+        comparison(playing, machine.rate_hz, keyboard.voices.size()),
         share(playing.share),
         viewer(machine.rate_hz) {
     keyboard.wake(0);
@@ -412,14 +414,14 @@ struct Engine::Player {
       if (has_stepped) {
         differentiate(b, group, segment.frames);
         levels.apply(b, group, segment.frames);
-        mixing.add(b, group, segment, voices, watch);
+        mixing.add(b, group, segment, voices, watch, comparison);
       }
     };
     b.step(segment.frames, voices.awake_end(), drive, mix);
     levels.advance(segment.frames);
     voices.advance_gains(segment.frames);
-    if (voices.is_comparing()) {
-      mixing.compare(segment.frames, voices, [&](Voice& voice) { keyboard.invert(voice); });
+    if (comparison.is_needed(voices)) {
+      comparison.advance(segment.frames, voices, [&](Voice& voice) { keyboard.invert(voice); });
     }
     since_update += segment.frames;
     if (since_update == max_block_frames) {
@@ -608,6 +610,7 @@ struct Engine::Player {
   EnergyWatch watch;
   OutputLevels levels;
   Mixing mixing;
+  Comparison comparison;
   NoteShare share;
   Viewer viewer;
   std::uint64_t notes = 0;       // note-ons so far, the same in all engines that share them

@@ -7,25 +7,15 @@
 #include "core/random.h"
 
 namespace ressort::engine {
-namespace {
-
-constexpr double compared_s = 0.01;
-constexpr double compared_hz = 200.0;  // corner of the lowpass
-
-}  // namespace
-
-Mixing::Mixing(const Playing& playing, double rate_hz, std::size_t lanes)
+Mixing::Mixing(const Playing& playing)
     : gain_(playing.gain),
-      least_compared_(static_cast<std::size_t>(compared_s * rate_hz)),
-      lowpass_(1.0 - std::exp(-2.0 * std::numbers::pi * compared_hz / rate_hz)),
-      rows_(lanes * max_block_frames),
       bound_(playing.bare
                  ? runaway
                  : std::min(runaway, runaway_level / (playing.gain * playing.mean_body_gain))) {}
 
 template <class T>
 void Mixing::add(Bank<T>& bank, const VoiceGroup& group, const Segment& segment, Voices& voices,
-                 EnergyWatch& watch) {
+                 EnergyWatch& watch, Comparison& comparison) {
   PartBank<T>& part = bank.parts[group.part];
   const std::size_t count = part.program.outputs.size();
   const std::size_t width = part.width;
@@ -80,8 +70,10 @@ void Mixing::add(Bank<T>& bank, const VoiceGroup& group, const Segment& segment,
       continue;
     }
     voice.peak = std::max(voice.peak, peak);
-    if (voices.is_comparing()) {
-      keep_row(lane, voice, segment.frames, count, sample);
+    if (comparison.is_needed(voices)) {
+      for (std::size_t output = 0; output < count; ++output) {
+        comparison.keep(lane, segment.frames, [&](std::size_t n) { return sample(n, output); });
+      }
     }
     if (!are_all_steady && !voice.is_steady()) {
       add_one(part.program, voice, segment, 0, segment.frames, sample);
@@ -92,19 +84,6 @@ void Mixing::add(Bank<T>& bank, const VoiceGroup& group, const Segment& segment,
   }
   keep_last(bank, group, segment.frames, is_any_unstable, voices, watch);
   clear_wide_registers();
-}
-
-// Adds a voice's outputs, with the sign of its volume, to its row.
-template <class Sample>
-void Mixing::keep_row(std::size_t lane, const Voice& voice, std::size_t frames, std::size_t outputs,
-                      Sample&& sample) {
-  const double sign = voice.strength < 0.0 ? -1.0 : 1.0;
-  double* const row = rows_.data() + lane * max_block_frames;
-  for (std::size_t n = 0; n < frames; ++n) {
-    for (std::size_t output = 0; output < outputs; ++output) {
-      row[n] += sign * sample(n, output);
-    }
-  }
 }
 
 // Keeps the last sample of each lane. An unstable voice keeps its last sane sample instead, because
@@ -183,7 +162,9 @@ void Mixing::make_noise(const Segment& segment, MakeNoise make, bool is_silent) 
   noise_ += count * segment.frames * splitmix_step;
 }
 
-template void Mixing::add(Bank<float>&, const VoiceGroup&, const Segment&, Voices&, EnergyWatch&);
-template void Mixing::add(Bank<double>&, const VoiceGroup&, const Segment&, Voices&, EnergyWatch&);
+template void Mixing::add(Bank<float>&, const VoiceGroup&, const Segment&, Voices&, EnergyWatch&,
+                          Comparison&);
+template void Mixing::add(Bank<double>&, const VoiceGroup&, const Segment&, Voices&, EnergyWatch&,
+                          Comparison&);
 
 }  // namespace ressort::engine

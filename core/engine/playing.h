@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -95,13 +96,22 @@ struct VelocityCurve {
   }
 };
 
+// Returns the number of samples that are summed where voices are compared, at about 5.5 kHz.
+inline std::size_t compared_step(double rate_hz) {
+  constexpr double compared_hz = 5512.5;
+  return static_cast<std::size_t>(std::max(1.0, std::round(rate_hz / compared_hz)));
+}
+
 struct Playing {
   int voices = 1;
   double gain = 1.0;            // output per unit of position
   double body_gain = 1.0;       // from the outputs to what is heard, at the loudest frequency
   double mean_body_gain = 1.0;  // the same for white noise
-  bool bare = false;            // the network alone: no ramps, no smoothing, no sleep
-  double damper_s = 0.0;        // T60 of a released voice; 0: it rings freely
+  // Response of what is heard to an impulse of the outputs, each the sum of compared_step()
+  // samples.
+  std::vector<double> body_response = {1.0};
+  bool bare = false;                    // the network alone: no ramps, no smoothing, no sleep
+  double damper_s = 0.0;                // T60 of a released voice; 0: it rings freely
   std::vector<CurvePoint> damper_keys;  // the same by key; replaces `damper_s`
   std::vector<CurvePoint> keys_db;      // gain by key; empty: 0 dB
   bool noise = false;                   // the outputs modulate white noise

@@ -83,9 +83,9 @@ struct alignas(64) Voice {
   std::uint64_t turn = 0;         // serial number of its key press
   const Voice* beside = nullptr;  // earlier voice of its key, with which it is compared
   std::size_t compared_frames = 0;
-  double lowpassed = 0.0;         // its output while it is compared
-  double lowpassed_beside = 0.0;  // that of the earlier voice
-  double agreement = 0.0;         // sum of products of both
+  double agreement = 0.0;  // running sum of products of both, without their signs
+  double power = 0.0;      // running sums of squares
+  double power_beside = 0.0;
   double frequency_hz = 0.0;      // without bend; 0: as the model is written
   double sounding_hz = 0.0;       // with bend, glide and vibrato
   double key_hz = 0.0;            // requested frequency, before the stability limit
@@ -163,7 +163,7 @@ class Voices {
   void ramp_volume(Voice& voice, const SideGains& level, double seconds = 0.02) const;
   // Ramps it within one block, or to the end of the current ramp.
   void follow_volume(Voice& voice, const SideGains& level) const;
-  // Compares a new voice with an earlier one of its key from now on; see Mixing::compare().
+  // Compares a new voice with an earlier one of its key from now on; see Comparison.
   void compare(Voice& voice, const Voice& earlier) {
     voice.beside = &earlier;
     is_comparing_ = true;

@@ -1,0 +1,78 @@
+// core/engine: compares a new voice with an earlier one of its key that rings on, so that the new
+// one takes nothing from what is heard.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include "core/engine/voices.h"
+
+namespace ressort::engine {
+
+// Two waves of one pitch add up or cancel by chance, and the sign of the softer one is free. Both
+// are compared as they are heard behind the body: by the convolution with its impulse response, at
+// about 5.5 kHz. Two waves of nearly one pitch beat, so that a comparison goes on for a second.
+// All functions but the constructor: [audio] wait-free.
+class Comparison {
+ public:
+  Comparison(const Playing& playing, double rate_hz, std::size_t lanes);
+
+  // Behind a body, earlier sound is still heard when a comparison begins.
+  bool is_needed(const Voices& voices) const { return has_body_ || voices.is_comparing(); }
+
+  // Adds an output of a lane to the frames of this segment.
+  template <class Sample>
+  void keep(std::size_t lane, std::size_t frames, Sample&& sample) {
+    double* const row = rows_.data() + lane * max_block_frames;
+    for (std::size_t n = 0; n < frames; ++n) {
+      row[n] += sample(n);
+    }
+  }
+
+  // Ends a segment. Calls invert(voice) for a new voice when the correlation of both voices over
+  // the last 10 ms is clearly negative.
+  template <class Invert>
+  void advance(std::size_t frames, Voices& voices, Invert&& invert);
+
+ private:
+  void follow(std::size_t frames, Voices& voices);
+  void push(Voices& voices);
+  double heard(std::size_t lane) const;
+  static bool takes_from_earlier(const Voice& voice);
+
+  double gain_;
+  std::size_t step_;              // frames that are summed
+  std::vector<double> response_;  // of the body, at every step; the last one first
+  bool has_body_;
+  double kept_;               // share of a running sum that each step keeps
+  std::size_t least_frames_;  // before the first decision
+  std::size_t most_frames_;
+  std::vector<double> rows_;  // [lane][frame] sum of a voice's outputs
+  std::vector<double> sums_;  // [lane] of the current step
+  std::vector<double> past_;  // [lane][2 * responses] sums of the last steps, twice
+  std::size_t frame_ = 0;     // in the current step
+  std::size_t at_ = 0;        // the last step in `past_`
+};
+
+template <class Invert>
+void Comparison::advance(std::size_t frames, Voices& voices, Invert&& invert) {
+  follow(frames, voices);
+  bool goes_on = false;
+  for (Voice& voice : voices) {
+    if (voice.beside == nullptr) {
+      continue;
+    }
+    if (voice.compared_frames >= least_frames_ && voice.volume_frames == 0 &&
+        takes_from_earlier(voice)) {
+      invert(voice);
+    }
+    const bool is_compared = voice.is_live() && voice.beside->is_live() &&
+                             voice.beside->key == voice.key && voice.compared_frames < most_frames_;
+    voice.beside = is_compared ? voice.beside : nullptr;
+    goes_on |= is_compared;
+  }
+  voices.set_comparing(goes_on);
+}
+
+}  // namespace ressort::engine
