@@ -83,34 +83,9 @@ class StateLayout {
     state.shapes.modes = padded_;
     state.shapes.stride = stride_;
     state.shapes.row = row_;
-    for (T** row : {&state.motion.q, &state.motion.d, &state.motion.k, &state.motion.z,
-                    &state.saved.q, &state.saved.d, &state.sleep.spread, &state.sleep.decay,
-                    &state.sleep.amplitude, &state.sleep.debt}) {
-      *row = arena_.take(stride_);
-    }
-    state.sweep.load = arena_.take(row_);
-    state.held.give = arena_.take(link_count(modes_));
-    state.sleep.loudness = arena_.take(observed);
-    state.sleep.room = arena_.take(observed);
+    // Constant numbers.
     state.shapes.stiffness = factors(modes_.stiffness);
     state.shapes.damping = factors(modes_.damping);
-    state.shapes.pushes = rows(
-        modes_.pushes, [](auto& push) -> auto& { return push.shape; });
-    state.shapes.places = rows(
-        modes_.places, [](auto& place) -> auto& { return place.shape; });
-    state.shapes.outputs = rows(
-        modes_.outputs, [](auto& output) -> auto& { return output.place.shape; });
-    if (modes_.is_exact && !modes_.is_crossed) {
-      for (T** row : {&state.motion.root, &state.motion.k_step, &state.motion.z_step}) {
-        *row = arena_.take(stride_);
-      }
-      const std::size_t count = shape_count() * stride_;
-      T* const shape = arena_.take(count);
-      if (shape != nullptr) {
-        std::copy_n(state.shapes.pushes, count, shape);
-      }
-      state.shapes.unscaled = shape;
-    }
     if (modes_.is_crossed) {
       state.shapes.speeds = rows(
           modes_.places, [](auto& place) -> auto& { return place.speed; });
@@ -121,24 +96,39 @@ class StateLayout {
         modes_.pushes, [](auto& push) -> auto& { return push.shape; });
     state.shapes.place_norm = norms(
         modes_.places, [](auto& place) -> auto& { return place.shape; });
+    state.passive.give = gives();
+    take_shapes(state.shapes);
+    // Numbers that a copy of the kernel needs, from motion.q to saved.q.
+    for (T** row :
+         {&state.motion.q, &state.motion.d, &state.motion.k, &state.motion.z, &state.sleep.spread,
+          &state.sleep.decay, &state.sleep.amplitude, &state.sleep.debt}) {
+      *row = arena_.take(stride_);
+    }
+    state.sweep.load = arena_.take(row_);
+    state.held.give = arena_.take(link_count(modes_));
+    state.sleep.loudness = arena_.take(observed);
+    state.sleep.room = arena_.take(observed);
+    if (modes_.is_exact && !modes_.is_crossed) {
+      for (T** row : {&state.motion.root, &state.motion.k_step, &state.motion.z_step}) {
+        *row = arena_.take(stride_);
+      }
+      state.shapes.unscaled = state.shapes.pushes;
+      take_shapes(state.shapes);
+    }
     state.motion.used = arena_.take(modes_.stiffness.size() + modes_.damping.size() + 1);
     state.inputs.late = arena_.take(modes_.pushes.size());
-    state.inputs.amplitude = arena_.take(max_block_frames * modes_.pushes.size());
     state.ends.compliance = arena_.take(places);
     state.ends.soft_speed = arena_.take(stride_);
     state.ends.x = arena_.take(ends);
     state.ends.v = arena_.take(ends);
     state.ends.force = arena_.take(ends);
-    state.saved.force = arena_.take(places);
     state.ends.kicked = arena_.take(places);
     state.sweep.kick = arena_.take(most_rows + places + modes_.pushes.size());
     state.sweep.speed = arena_.take(most_rows + places + modes_.pushes.size());
     state.sweep.heard = arena_.take(most_rows + modes_.outputs.size());
-    state.sweep.bundle = arena_.take(most_rows * row_);
     state.forces.count = static_cast<std::size_t>(
         std::count_if(modes_.outputs.begin(), modes_.outputs.end(),
                       [](const ModalOutput& output) { return output.is_force; }));
-    state.sweep.seen = arena_.take(max_block_frames * (observed + state.forces.count));
     state.forces.rows = arena_.take(2 * state.forces.count * stride_);
     state.forces.still = arena_.take(state.forces.count);
     state.forces.damped = arena_.take(state.forces.count);
@@ -147,27 +137,44 @@ class StateLayout {
         std::all_of(modes_.pushes.begin(), modes_.pushes.end(),
                     [](const ModalPush& push) { return push.by == ModalPush::By::force; });
     state.ends.exerted = arena_.take(ends);
-    state.saved.x = arena_.take(ends);
-    state.saved.v = arena_.take(ends);
     state.passive.shove = arena_.take(places);
     state.passive.count = passives_;
     state.passive.reply = arena_.take(observed * passives_);
     state.passive.gamma = arena_.take(passives_ * passives_);
-    state.passive.straight = arena_.take((2 * most_straight + 1) * most_straight);
+    state.passive.straight =
+        arena_.take(passives_ > 0 ? (2 * most_straight + 1) * most_straight : 0);
     state.passive.memory = arena_.take(passive_rows * passives_);
-    const Cluster all{.count = static_cast<std::uint32_t>(passives_)};
-    state.passive.numbers = arena_.take(all.numbers());
     state.passive.pushed = arena_.take(passives_);
-    state.passive.give = gives();
-    for (T** row :
-         {&state.passive.opening, &state.passive.rush, &state.passive.slack, &state.passive.yield,
-          &state.passive.yield_step, &state.saved.yield, &state.saved.yield_step}) {
+    for (T** row : {&state.passive.opening, &state.passive.rush, &state.passive.slack,
+                    &state.passive.yield, &state.passive.yield_step}) {
       *row = arena_.take(passives_);
     }
+    // Numbers of one block.
+    for (T** row : {&state.saved.q, &state.saved.d}) {
+      *row = arena_.take(stride_);
+    }
+    state.saved.force = arena_.take(places);
+    state.saved.x = arena_.take(ends);
+    state.saved.v = arena_.take(ends);
+    state.saved.yield = arena_.take(passives_);
+    state.saved.yield_step = arena_.take(passives_);
+    state.inputs.amplitude = arena_.take(max_block_frames * modes_.pushes.size());
+    state.sweep.bundle = arena_.take(most_rows * row_);
+    state.sweep.seen = arena_.take(max_block_frames * (observed + state.forces.count));
+    const Cluster all{.count = static_cast<std::uint32_t>(passives_)};
+    state.passive.numbers = arena_.take(all.numbers());
     return arena_.used();
   }
 
  private:
+  void take_shapes(ModalShapes<T>& shapes) {
+    shapes.pushes = rows(
+        modes_.pushes, [](auto& push) -> auto& { return push.shape; });
+    shapes.places = rows(
+        modes_.places, [](auto& place) -> auto& { return place.shape; });
+    shapes.outputs = rows(
+        modes_.outputs, [](auto& output) -> auto& { return output.place.shape; });
+  }
   const T* gives() {
     T* const first = arena_.take(passives_);
     T* next = first;
@@ -178,9 +185,6 @@ class StateLayout {
       }
     }
     return first;
-  }
-  std::size_t shape_count() const {
-    return modes_.pushes.size() + modes_.places.size() + modes_.outputs.size();
   }
   // Returns the factors of all shares, for each share only the packs in which it has any.
   const T* factors(const std::vector<ModalShare>& shares) {
@@ -386,7 +390,7 @@ template <class T>
 bool ModalKernel<T>::copy_from(const Kernel<T>& from) {
   const auto& other = static_cast<const ModalKernel&>(from);
   this->coefficients = other.coefficients;
-  numbers_ = other.numbers_;
+  std::copy<const T*>(other.state_.motion.q, other.state_.saved.q, state_.motion.q);
   indices_ = other.indices_;
   held_ends_ = other.held_ends_;
   active_.links = other.active_.links;
