@@ -232,6 +232,7 @@ struct Bank : BlockBuffers<T> {
         if (drive(parts[p], group)) {
           task.frames = frames;
           task.lanes = group.end - group.first;
+          task.is_still = filled_part == &parts[p];
           together.wanted.push_back(kernel);
         }
       });

@@ -23,6 +23,7 @@ typename KernelTask<T>::Job KernelTask<T>::job_in(Kernel<T>& kernel, BlockBuffer
           .block = {.frames = frames,
                     .value = buffers.value.data(),
                     .velocity = buffers.velocity.data(),
+                    .is_still = is_still,
                     .audio = buffers.audio.data(),
                     .outputs = filled.outputs.data(),
                     .lanes = lanes}};

@@ -33,6 +33,7 @@ class KernelTask final : public Task {
   // Set by the caller.
   std::size_t frames = 0;
   std::size_t lanes = std::numeric_limits<std::size_t>::max();  // Playing lanes of the kernel.
+  bool is_still = false;                                        // as in Block
   BlockBuffers<T> buffers;
 
   void perform() override;
