@@ -35,8 +35,11 @@ dpkg --info "$arm"/ressort_*_arm64.deb | grep -q 'Depends:.*libjack' || {
 place=$(mktemp -d)
 trap 'rm -r "$place"' EXIT
 for preset; do
-  "$build/ressort" render "$preset" -q --format double --seconds 1.5 -o "$place/here.wav"
-  "$qemu" "$arm/ressort" render "$preset" -q --format double --seconds 1.5 -o "$place/arm.wav"
+  # The contacts of the sitar's bridge multiply rounding errors: on one machine, another last digit of
+  # `buzz` changes the sound by -146 dB after 0.5 s and by -82 dB after 1.5 s.
+  [ "$preset" = Sitar ] && seconds=0.5 || seconds=1.5
+  "$build/ressort" render "$preset" -q --format double --seconds $seconds -o "$place/here.wav"
+  "$qemu" "$arm/ressort" render "$preset" -q --format double --seconds $seconds -o "$place/arm.wav"
   python3 - "$preset" "$place/here.wav" "$place/arm.wav" <<'END'
 import array, math, sys
 
