@@ -210,7 +210,8 @@ std::vector<StruckInfo> find_struck(const Network& network, const Machine& machi
   }
   std::vector<StruckInfo> struck;
   for (std::uint32_t i = 0; i < network.masses.size(); ++i) {
-    if (is_played[i]) {
+    // The places of an expanded network have lost the macros that name them.
+    if (is_played[i] && (network.masses[i].kind != MassKind::point || !network.macros.empty())) {
       struck.push_back({.name = struck_name(network, i), .first = i});
     }
   }

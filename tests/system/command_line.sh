@@ -226,7 +226,8 @@ grep -qx 'scene,way,precision,.*,front_published,front_physical,failure,also' dr
   { echo "FAILED: the chart's table lacks something"; failures=$((failures + 1)); }
 [ "$(grep -c '^triangle,' drawn/chart.csv)" -ge 12 ] ||
   { echo "FAILED: the chart's table lacks methods"; failures=$((failures + 1)); }
-expect 0 "overview.svg: all scenes" "$program" chart triangle -t 0.1 -o drawn
+model places.mdl '@s string 9 1 0.1 0.001 0 0\n@in1 frcInput [@s 0.3]\n@out1 posOutput [@s 0.71]\n'
+expect 0 "overview.svg: all scenes" "$program" chart triangle places.mdl -t 0.1 -o drawn
 expect 0 "</svg>" cat drawn/triangle.svg
 expect 2 "gnuplot, which draws the figures, is not installed" \
   env PATH=/nowhere "$program" modes PolyTriangle -o shapes.svg
