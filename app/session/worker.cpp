@@ -39,6 +39,13 @@ std::string words_for(const ControllerInput& input) {
               : ", an encoder (" + std::string(name_of(input.mode)) + "),");
 }
 
+std::string with_lines(std::string text, const std::vector<std::string>& lines) {
+  for (const std::string& line : lines) {
+    text += "\n" + line;
+  }
+  return text;
+}
+
 }  // namespace
 
 Worker::Worker(Process& process, const SessionOptions& options, MessageHandler on_message,
@@ -283,7 +290,7 @@ Result<std::string> Worker::apply_edit(Draft draft) {
     }
     if (differs_in_start_values_only(*before, draft.scene)) {
       if (changed.empty()) {
-        return name + ": reloaded; the sound is unchanged";
+        return with_lines(name + ": reloaded; the sound is unchanged", draft.scene.warnings);
       }
       std::vector<TimedEvent> events;
       for (const Setting& setting : changed) {
@@ -296,8 +303,9 @@ Result<std::string> Worker::apply_edit(Draft draft) {
       }
       if (events.size() == changed.size()) {
         send(events);
+        std::string text = with_lines(name + ": " + to_text(changed), draft.scene.warnings);
         watch_.set_as_read(std::move(draft.scene));
-        return name + ": " + to_text(changed);
+        return text;
       }
     }
     draft.continues_state = has_same_parameters(before->network, draft.scene.network) &&
@@ -316,13 +324,10 @@ Result<std::string> Worker::apply_edit(Draft draft) {
     return result.error();
   }
   builder_.measure_parts();
-  std::string text = name + (serial == engines_.serial() ? ": new numbers" : ": loaded again") +
-                     " in " + fixed((*result)->load_ms, 1) + " ms" +
-                     (changed.empty() ? "" : "; " + to_text(changed));
-  for (const std::string& warning : (*result)->warnings) {
-    text += "\n" + warning;
-  }
-  return text;
+  return with_lines(name + (serial == engines_.serial() ? ": new numbers" : ": loaded again") +
+                        " in " + fixed((*result)->load_ms, 1) + " ms" +
+                        (changed.empty() ? "" : "; " + to_text(changed)),
+                    (*result)->warnings);
 }
 
 bool Worker::send(const std::vector<TimedEvent>& events) {

@@ -160,6 +160,19 @@ TEST_CASE("An edited parameter reaches the sounding voice", "[reload]") {
   CHECK(stage.session.parameter("K") == 0.012);
 }
 
+TEST_CASE("An edit that is ignored is told", "[reload]") {
+  const Folder folder;
+  folder.write("m.mdl", model_text("0.01"));
+  Stage stage(folder.write("p.toml", preset()));
+  const std::string ignored = "warning: ignored: an element starts with '@'";
+  const Reload same = stage.after([&] { folder.write("m.mdl", model_text("0.01") + "hello\n"); });
+  CHECK(has(same.news, "p: reloaded; the sound is unchanged"));
+  CHECK(has(same.news, ignored));
+  const Reload moved = stage.after([&] { folder.write("m.mdl", model_text("0.012") + "hello\n"); });
+  CHECK(has(moved.news, "p: K = 0.012"));
+  CHECK(has(moved.news, ignored));
+}
+
 TEST_CASE("An edited number in the model reaches the sounding voice", "[reload]") {
   const Folder folder;
   folder.write("m.mdl", model_text("0.01", "1."));
