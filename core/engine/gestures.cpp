@@ -23,14 +23,15 @@ Stroke stroke_of(const Control& control, double amount = 1.0, double key = middl
   return {.amount = amount, .has_control = true, .settings = control.settings_on(key)};
 }
 
-// Returns the key of the string that a control with fixed tuning strikes. A control that is open to
-// lower or to higher keys plays the string of its last or first key.
-double string_of(const Control& control, double key) {
+// Returns the key of the string that a control with fixed tuning strikes, if it has keys of its
+// own. A control that is open to lower or to higher keys plays the string of its last or first key.
+std::optional<double> string_of(const Control& control, double key) {
   const bool is_open_below = control.lowest_key == 0;
   const bool is_open_above = control.highest_key == 127;
-  return is_open_below == is_open_above ? key
-         : is_open_below                ? control.highest_key
-                                        : control.lowest_key;
+  if (is_open_below && is_open_above) {
+    return std::nullopt;
+  }
+  return is_open_below ? control.highest_key : is_open_above ? control.lowest_key : key;
 }
 
 double key_of(const Voice& voice) {
@@ -180,7 +181,8 @@ void Gestures::play(const Control& control, double amount, const Scope& scope, K
     return parameters.set(control.target, stroke.mapped());
   }
   if (row_of(control.gesture).is_blow && playing_.tuning == Tuning::fixed) {
-    stroke.string_hz = playing_.keys_hz[static_cast<std::size_t>(string_of(control, key))];
+    const std::optional<double> string = string_of(control, key);
+    stroke.string_hz = string ? playing_.keys_hz[static_cast<std::size_t>(*string)] : 0.0;
   }
   play(row_of(control.gesture), control.target, stroke, scope, lane, keyboard, parameters);
 }
