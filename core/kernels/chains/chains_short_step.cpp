@@ -155,7 +155,7 @@ void move_ahead(ShortBody<typename S::V, packs>& body, Ahead<S, packs>& ahead) {
   });
 }
 
-// In single precision the rounding errors of move_ahead() would be too large.
+// The rounding errors of move_ahead() would be too large in single precision.
 template <class T, std::size_t packs>
 constexpr bool goes_ahead = sizeof(T) == sizeof(double) && packs <= 3;
 
