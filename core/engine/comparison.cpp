@@ -55,6 +55,9 @@ void Comparison::push(Voices& voices) {
     double* const past = past_.data() + 2 * taps * lane;
     past[at_] = past[at_ + taps] = std::exchange(sums_[lane], 0.0);
   }
+  if (!voices.is_comparing()) {
+    return;
+  }
   for (Voice& voice : voices) {
     if (voice.beside == nullptr) {
       continue;

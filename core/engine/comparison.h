@@ -58,6 +58,9 @@ class Comparison {
 template <class Invert>
 void Comparison::advance(std::size_t frames, Voices& voices, Invert&& invert) {
   follow(frames, voices);
+  if (!voices.is_comparing()) {
+    return;
+  }
   bool goes_on = false;
   for (Voice& voice : voices) {
     if (voice.beside == nullptr) {
