@@ -1,4 +1,7 @@
+#include <algorithm>
+#include <cctype>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "app/command_line/command_lines.h"
@@ -139,6 +142,21 @@ CLI::Option* unused_by_statistics(CLI::App& command) {
   return nullptr;
 }
 
+// Returns the given options that only some inputs use, with the input of their group.
+auto particular_options(const CLI::App& command) {
+  std::vector<std::pair<std::string, std::string>> given;
+  for (const CLI::Option* option : command.get_options()) {
+    std::string group = option->get_group();
+    std::transform(group.begin(), group.end(), group.begin(), ::tolower);
+    const bool is_common = option->check_name("FILE") || option->check_name("--output") ||
+                           option->check_name("--force");
+    if (option->count() > 0 && !is_common) {
+      given.emplace_back(option->get_name(), group);
+    }
+  }
+  return given;
+}
+
 }  // namespace
 
 void add_body(CLI::App& app, int& code) {
@@ -153,7 +171,9 @@ void add_body(CLI::App& app, int& code) {
     if (CLI::Option* unused = is_statistical ? unused_by_statistics(*command) : nullptr) {
       throw CLI::ExcludesError(unused->get_name(), "--statistical");
     }
-    return body_command(chosen);
+    BodyRequest request = chosen;
+    request.particular = particular_options(*command);
+    return body_command(request);
   });
   command->add_option("FILE", request.input, "recording, solid or model")->type_name("PATH");
   add_output(*command, request.output, "model to write (default: print)");

@@ -87,6 +87,13 @@ expect 2 "FILE or --statistical is required" "$program" body
 expect 2 "--floor excludes --statistical" "$program" body --statistical 9:1,90:1 --loss 1 --floor -9
 expect 2 "--seed requires --statistical" "$program" body blow.flac --seed 2
 expect 2 "at least two points HZ:DENSITY" "$program" body --statistical 0.05 --loss 0.02
+expect 2 "only a recording becomes a preset" "$program" body --statistical 100:0.05,900:0.01 \
+  --loss 0.02 -o box.toml
+printf '220 0.5 1.2\n447.1 0.3 2\n' > modes.txt
+expect 0 "modes.mdl: 2 modes from 220.0 to 447.1 Hz" "$program" body modes.txt -o modes.mdl
+expect 0 "--picture has no effect on a resonance model" "$program" body modes.txt --picture a.svg
+expect 0 "--material has no effect on a recording" "$program" body blow.flac --material steel
+expect 2 "only a recording becomes a preset" "$program" body modes.txt -o modes.toml
 expect 2 "needs --loss" "$program" body --statistical 100:0.05,900:0.01
 expect 2 "900 modes, more than the limit of 400" "$program" body --statistical 100:1,1000:1 --loss 1
 expect 2 "ascending frequencies of 1 to 20000" "$program" body --statistical 900:1,100:1 --loss 1

@@ -34,10 +34,28 @@ std::string_view likely_kind(std::string_view bytes) {
   return bytes.find('\0') == std::string_view::npos ? "text" : "data of an unknown kind";
 }
 
+// Reports the given options that an input of this kind does not use, where `used` names the used
+// ones outside its own group, and rejects a preset as output of anything but a recording.
+int check_options(const BodyRequest& request, std::string_view kind, std::string_view used) {
+  for (const auto& [name, group] : request.particular) {
+    if (group != kind && used.find(name) == std::string_view::npos) {
+      print_error(name + " has no effect on a " + std::string(kind));
+    }
+  }
+  if (kind != "recording" && request.output.ends_with(".toml")) {
+    return reject("'" + request.output +
+                  "': only a recording becomes a preset; choose a name that ends in .mdl");
+  }
+  return exit_code::done;
+}
+
 }  // namespace
 
 int body_command(const BodyRequest& request) {
   if (request.input.empty()) {
+    if (const int code = check_options(request, "statistics", "--modes --mass --loss")) {
+      return code;
+    }
     StatisticalBodyOptions options = request.statistical;
     options.statistics.mass = request.mass;
     options.statistics.loss = request.loss;
@@ -60,6 +78,9 @@ int body_command(const BodyRequest& request) {
     return options;
   };
   if (is_model) {
+    if (const int code = check_options(request, "model", "--modes")) {
+      return code;
+    }
     NetworkBodyOptions options = common(request.network);
     options.modes = static_cast<std::size_t>(request.modes.value_or(0));
     return network_body(options);
@@ -69,6 +90,9 @@ int body_command(const BodyRequest& request) {
     return reject(bytes.error().message);
   }
   if (solids::surface_format(*bytes) != solids::SurfaceFormat::unknown) {
+    if (const int code = check_options(request, "solid", "--picture --modes --loss")) {
+      return code;
+    }
     if (request.loss.size() > 1) {
       return reject("--loss: a solid has one loss factor; give one number");
     }
@@ -81,12 +105,18 @@ int body_command(const BodyRequest& request) {
     return solid_body(options);
   }
   if (const auto resonances = parse_resonances(*bytes)) {
+    if (const int code = check_options(request, "resonance model", "--mass")) {
+      return code;
+    }
     return resonance_body(*resonances, common(request.recording), request.mass);
   }
   if (!SoundReader::open(request.input)) {
     return reject("'" + request.input + "' looks like " + std::string(likely_kind(*bytes)) +
                   "; bodies are made of sound files, of solids in STL, OBJ, PLY or OFF, of "
                   "resonance models (frequency, amplitude, bandwidth) and of .mdl models");
+  }
+  if (const int code = check_options(request, "recording", "--picture --modes --mass")) {
+    return code;
   }
   BodyOptions options = common(request.recording);
   options.picture = request.picture;

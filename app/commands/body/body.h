@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "app/commands/body/solid.h"
@@ -47,6 +48,8 @@ struct BodyRequest {
   std::optional<int> modes;
   double mass = 40.0;
   std::vector<CurvePoint> loss;  // loss factor; empty: that of the material
+  // Given options that only some inputs use: name, and the input of its group in the help.
+  std::vector<std::pair<std::string, std::string>> particular;
 };
 
 // Selects the kind of body by the file's content; models by their extension. [main]

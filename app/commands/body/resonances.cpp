@@ -103,7 +103,14 @@ int resonance_body(const std::vector<Resonance>& resonances, const BodyOptions& 
     std::fputs(text.c_str(), stdout);
     return exit_code::done;
   }
-  return write_output(options.output, text, options.force);
+  if (const int code = write_output(options.output, text, options.force)) {
+    return code;
+  }
+  std::printf("%s: %s from %s to %s Hz\n", options.output.c_str(),
+              counted(resonances.size(), "mode", "modes").c_str(),
+              fixed(resonances.front().frequency_hz, 1).c_str(),
+              fixed(resonances.back().frequency_hz, 1).c_str());
+  return exit_code::done;
 }
 
 }  // namespace ressort::commands
