@@ -437,8 +437,10 @@ std::vector<std::vector<std::string>> control_rows(const ConsoleContext& console
       continue;
     }
     const bool turns = control.gesture == Gesture::parameter;
-    const std::string range = print_number(control.low) + " to " + print_number(control.high) +
-                              (control.range_keys.empty() ? "" : " on middle C, by key");
+    // Six digits, because the values of a key between two points have many.
+    char range[64];
+    std::snprintf(range, sizeof range, "%.6g to %.6g%s", control.low, control.high,
+                  control.range_keys.empty() ? "" : " on middle C, by key");
     const bool has_all_keys = control.lowest_key == 0 && control.highest_key == 127;
     const std::string keys = has_all_keys ? ""
                                           : ", keys " + std::to_string(control.lowest_key) +
