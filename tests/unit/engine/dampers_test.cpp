@@ -282,27 +282,36 @@ TEST_CASE("a soft strike leaves a louder note ringing, with keys tuned or fixed"
   CHECK(last({loud, up}) < 0.02 * last({loud}));
 }
 
+// Returns a preset whose softest note is as long as its loudest and 12 dB below it.
+Preset softer_by_12_db() {
+  Preset preset = struck(4);
+  preset.controls[0].low = preset.controls[0].high;
+  preset.controls[0].has_level = true;
+  preset.controls[0].low_db = -12.0;
+  return preset;
+}
+
+// Returns the sum of squares of a part of the sound.
+double power_from(const std::string& text, const Preset& preset, const std::vector<Event>& events,
+                  std::size_t from, std::size_t to) {
+  Player player(text, preset);
+  player.run(to, events);
+  return std::accumulate(player.y().begin() + static_cast<std::ptrdiff_t>(from), player.y().end(),
+                         0.0, [](double sum, double y) { return sum + y * y; });
+}
+
 // A mode of one voice and the same mode of another meet in any phase. A correlation above -0.2 is
 // left as it is, so with the ratio r of the amplitudes the power is at least 1 + r^2 - 0.4 r. At
 // the best phase the amplitude is the sum of both.
 TEST_CASE("a soft strike takes nothing from a louder note of its key", "[dampers]") {
   const std::string text = "@m osc 1. 0.01 0.0001 0. 0.\n@in1 frcInput @m\n@out1 posOutput @m\n";
-  Preset preset = struck(4);
-  preset.controls[0].low = preset.controls[0].high;
-  preset.controls[0].has_level = true;
-  preset.controls[0].low_db = -12.0;
-  const double period = 2.0 * std::numbers::pi * 44100.0 / (2.0 * std::numbers::pi * 261.63);
+  const Preset preset = softer_by_12_db();
+  const double period = 44100.0 / 261.63;
   double most_db = -100.0;
   for (int eighth = 0; eighth < 8; ++eighth) {
     const auto at = static_cast<std::uint32_t>(4000.0 + period * eighth / 8.0);
     const auto power = [&](const std::vector<Event>& events) {
-      Player player(text, preset);
-      player.run(14000, events);
-      double sum = 0.0;
-      for (std::size_t n = at + 1600; n < 14000; ++n) {  // after 10 ms and a ramp of 20 ms
-        sum += player.y()[n] * player.y()[n];
-      }
-      return sum;
+      return power_from(text, preset, events, at + 1600, 14000);  // after 10 ms and a ramp of 20 ms
     };
     const Event loud = note_on(0, 60, 1.0);
     const Event soft = note_on(at, 60, 0.1);
@@ -316,25 +325,13 @@ TEST_CASE("a soft strike takes nothing from a louder note of its key", "[dampers
   CHECK(most_db == Approx(0.0).margin(0.3));  // amplitudes add up in phase
 }
 
-// Returns the sum of squares of a part of the sound.
-double power_from(const std::string& text, const Preset& preset, const std::vector<Event>& events,
-                  std::size_t from, std::size_t to) {
-  Player player(text, preset);
-  player.run(to, events);
-  return std::accumulate(player.y().begin() + static_cast<std::ptrdiff_t>(from), player.y().end(),
-                         0.0, [](double sum, double y) { return sum + y * y; });
-}
-
 // A soft note 3 Hz above the loud one beats with it. Without a change of its sign it would take
 // 20 log10(1 - 0.25) = -2.5 dB in each beat. The decision is at most 10 ms old and a change takes
 // 6 ms, in which the phase moves by 0.3: the correlation stays above -0.2 - 0.3, and in a window of
-// 50 ms the power above 1 + 0.25^2 - 2 * 0.25 * 0.5 = -0.9 dB.
+// 50 ms the power above 1 + 0.25^2 - 2 * 0.25 * 0.5 = -0.9 dB. Measured: no window below 0 dB.
 TEST_CASE("a soft strike that beats with a louder note of its key takes nothing", "[dampers]") {
   const std::string text = "@m osc 1. 0.01 0.00001 0. 0.\n@in1 frcInput @m\n@out1 posOutput @m\n";
-  Preset preset = struck(4);
-  preset.controls[0].low = preset.controls[0].high;
-  preset.controls[0].has_level = true;
-  preset.controls[0].low_db = -12.0;
+  const Preset preset = softer_by_12_db();
   Event loud = note_on(0, 60, 1.0);
   Event soft = note_on(4000, 60, 0.0001);
   soft.value2 = 264.63;
@@ -349,13 +346,11 @@ TEST_CASE("a soft strike that beats with a louder note of its key takes nothing"
 }
 
 // A body that resonates at a string's second partial, 1.98 times the first, makes that partial the
-// louder one. Its sign decides, though the first is louder in the string.
+// louder one. Its sign decides, though the first is louder in the string. At a correlation of -0.2
+// a note 12 dB softer takes 0.16 dB. Measured: 1.0 to 2.8 dB, and -3.9 dB when the string decides.
 TEST_CASE("two notes of a key are compared as they are heard behind the body", "[dampers]") {
   const std::string text = ringing_string();
-  Preset preset = struck(4);
-  preset.controls[0].low = preset.controls[0].high;
-  preset.controls[0].has_level = true;
-  preset.controls[0].low_db = -12.0;
+  Preset preset = softer_by_12_db();
   preset.bodies.push_back(
       {"/models/Body.mdl", support::network_of("@r osc 1. 0.00545 0.002 0. 0.\n@in1 frcInput @r\n"
                                                "@out1 posOutput @r\n")});
@@ -372,7 +367,8 @@ TEST_CASE("two notes of a key are compared as they are heard behind the body", "
 }
 
 // A soft blow goes with the motion of what it strikes under fixed tuning, so both energies add up
-// and the correlation is not negative. A blow of half a period at any phase.
+// and the correlation is not negative. A blow of half a period at any phase. Measured: 1.06 to 1.56
+// times the sum of both.
 TEST_CASE("a soft blow on a network with fixed tuning adds to its motion", "[dampers]") {
   const std::string text = "@m osc 1. 0.0014 0.00001 0. 0.\n@in1 frcInput @m\n@out1 posOutput @m\n";
   Preset preset = struck(1);
