@@ -4,13 +4,10 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
-#include <map>
 #include <numbers>
 #include <set>
 #include <unordered_map>
 #include <utility>
-
-#include "core/groups.h"
 
 namespace ressort::solids {
 namespace {
@@ -98,8 +95,6 @@ Seams find_seams(const Surface& surface, bool is_sheet) {
     const std::size_t uses = end - i;
     if (uses == 1) {
       seams.open.push_back(edges[i]);
-    } else if (uses % 2 == 1) {
-      seams.crowded.push_back(edges[i]);
     } else if (uses > 2) {
       for (std::size_t k = i; k + 1 < end; k += 2) {
         const auto other =
@@ -109,6 +104,9 @@ Seams find_seams(const Surface& surface, bool is_sheet) {
         if (other != edges.begin() + static_cast<std::ptrdiff_t>(end)) {
           std::swap(edges[k + 1], *other);
         }
+      }
+      if (uses % 2 == 1) {
+        seams.crowded.push_back(edges[end - 1]);
       }
     }
     for (std::size_t k = i; k + 1 < end; k += is_sheet ? 1 : 2) {
@@ -140,45 +138,80 @@ std::string open_edges(const Surface& surface, const Seams& seams) {
   return text;
 }
 
-// Closes each loop of open edges that is short against the surface, with a fan of triangles around
-// its middle.
-void close_holes(Surface& surface, const std::vector<EdgeUse>& open, Repairs& repairs) {
-  Groups groups(surface.points.size());
-  for (const EdgeUse& edge : open) {
-    groups.join(static_cast<std::uint32_t>(edge.low), static_cast<std::uint32_t>(edge.high));
-  }
-  struct Loop {
-    double around = 0.0;  // m
-    Point3 sum{};
-    double points = 0.0;
-    int middle = -1;
+// One edge of a loop around a hole.
+struct Rim {
+  int from = 0;  // the point before it
+  int side = 0;  // 3 triangle + the corner where the triangle's edge begins
+};
+
+// Returns the loops of open edges. At each point, a loop leaves by the other end of the fan of
+// triangles at whose end it arrived, so loops that touch at a point stay apart. O(n)
+std::vector<std::vector<Rim>> find_holes(const Surface& surface, const Seams& seams) {
+  const auto side_of = [&](const EdgeUse& use) {
+    const Triangle& corners = surface.triangles[at(use.triangle)];
+    const auto* const start =
+        std::find(corners.begin(), corners.end(), use.is_forward ? use.low : use.high);
+    return 3 * use.triangle + static_cast<int>(start - corners.begin());
   };
-  std::map<std::uint32_t, Loop> loops;
-  const auto loop_of = [&](const EdgeUse& edge) -> Loop& {
-    return loops[groups.find(static_cast<std::uint32_t>(edge.low))];
+  const auto corner = [&](int side, int step) {
+    return surface.triangles[at(side / 3)][at((side + step) % 3)];
   };
-  for (const EdgeUse& edge : open) {
-    const Point3& low = surface.points[at(edge.low)];
-    const Point3& high = surface.points[at(edge.high)];
-    Loop& loop = loop_of(edge);
-    loop.around += length(high - low);
-    loop.sum = loop.sum + low + high;
-    loop.points += 2.0;
+  std::vector<int> beyond(3 * surface.triangles.size(), -1);  // [side] the side that continues it
+  for (const auto& [one, other] : seams.pairs) {
+    beyond[at(side_of(one))] = side_of(other);
+    beyond[at(side_of(other))] = side_of(one);
   }
+  std::vector<std::vector<Rim>> holes;
+  std::vector<int> place(surface.points.size(), -1);  // of a point in the path
+  std::vector<char> is_done(beyond.size(), 0);
+  for (int start = 0; at(start) < beyond.size(); ++start) {
+    std::vector<Rim> path;
+    int point = corner(start, 0);
+    for (int side = start; beyond[at(side)] < 0 && is_done[at(side)] == 0;) {
+      is_done[at(side)] = 1;
+      place[at(point)] = static_cast<int>(path.size());
+      path.push_back({point, side});
+      point = corner(side, corner(side, 0) == point ? 1 : 0);
+      if (place[at(point)] >= 0) {
+        const auto first = path.begin() + place[at(point)];
+        holes.emplace_back(first, path.end());
+        for (const Rim& rim : holes.back()) {
+          place[at(rim.from)] = -1;
+        }
+        path.erase(first, path.end());
+      }
+      do {  // Turns to the other side of the triangle at this point, and to the next triangle.
+        side = beyond[at(side)] < 0 ? side : beyond[at(side)];
+        side = side / 3 * 3 + (side + (corner(side, 0) == point ? 2 : 1)) % 3;
+      } while (beyond[at(side)] >= 0);
+    }
+  }
+  return holes;
+}
+
+// Closes each hole with a short edge, relative to the surface, by a fan of triangles around its
+// middle.
+void close_holes(Surface& surface, Repairs& repairs) {
   const double size = box_around(surface.points).diagonal();
-  for (auto& [group, loop] : loops) {
-    if (loop.around <= hole_share * size) {
-      loop.middle = static_cast<int>(surface.points.size());
-      surface.points.push_back(1.0 / loop.points * loop.sum);
-      ++repairs.holes;
-      repairs.longest_hole = std::max(repairs.longest_hole, loop.around / size);
+  for (const std::vector<Rim>& hole : find_holes(surface, find_seams(surface, false))) {
+    double around = 0.0;
+    Point3 middle{};
+    for (std::size_t i = 0; i < hole.size(); ++i) {
+      const Point3& point = surface.points[at(hole[i].from)];
+      around += length(surface.points[at(hole[(i + 1) % hole.size()].from)] - point);
+      middle = middle + 1.0 / static_cast<double>(hole.size()) * point;
     }
-  }
-  for (const EdgeUse& edge : open) {
-    if (const int middle = loop_of(edge).middle; middle >= 0) {
-      surface.triangles.push_back(edge.is_forward ? Triangle{edge.high, edge.low, middle}
-                                                  : Triangle{edge.low, edge.high, middle});
+    if (around > hole_share * size) {
+      continue;
     }
+    ++repairs.holes;
+    repairs.longest_hole = std::max(repairs.longest_hole, around / size);
+    for (const Rim& rim : hole) {
+      const Triangle& beside = surface.triangles[at(rim.side / 3)];
+      surface.triangles.push_back({beside[at((rim.side + 1) % 3)], beside[at(rim.side % 3)],
+                                   static_cast<int>(surface.points.size())});
+    }
+    surface.points.push_back(middle);
   }
 }
 
@@ -455,7 +488,7 @@ Result<ClosedSurface> close_surface(const Surface& given, const Progress& progre
     return tidy.error();
   }
   surface = *std::move(tidy);
-  close_holes(surface, find_seams(surface, false).open, repairs);
+  close_holes(surface, repairs);
   Seams seams = find_seams(surface, false);
   drop_open_parts(surface, seams, repairs);
   progress.spend(400 * surface.triangles.size());

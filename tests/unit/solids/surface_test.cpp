@@ -365,6 +365,60 @@ TEST_CASE("solids that touch along an edge are two parts", "[surface]") {
   }
 }
 
+// A box from a corner without the two triangles of its top.
+Surface open_box(const Point3& sides, const Point3& corner) {
+  Surface box = box_surface(sides, corner);
+  std::erase_if(box.triangles, [&](const Triangle& triangle) {
+    return std::all_of(triangle.begin(), triangle.end(), [&](int point) {
+      return box.points[static_cast<std::size_t>(point)][2] == corner[2] + sides[2];
+    });
+  });
+  return box;
+}
+
+TEST_CASE("holes that touch at a point are closed one by one", "[surface]") {
+  // Two open boxes share one point of their rims. Each rim has a length of 4 and of 3.2, and the
+  // size is the length of (1.8, 1.8, 4), 4.74. The fans lie in the tops.
+  for (const bool is_larger_first : {false, true}) {
+    const Surface larger = open_box({1.0, 1.0, 4.0}, {0.0, 0.0, 0.0});
+    const Surface smaller = open_box({0.8, 0.8, 2.0}, {1.0, 1.0, 2.0});
+    Surface boxes = is_larger_first ? larger : smaller;
+    append(boxes, is_larger_first ? smaller : larger);
+    const auto kept = closed(boxes);
+    REQUIRE(kept);
+    CHECK(kept->repairs.holes == 2);
+    CHECK(kept->repairs.longest_hole == Approx(4.0 / std::hypot(1.8, 1.8, 4.0)).epsilon(1e-12));
+    CHECK(kept->repairs.parts == 1);
+    CHECK(kept->volume == Approx(4.0).epsilon(1e-12));
+    CHECK(kept->surface.triangles.size() == 14);
+  }
+
+  // The sides of the top of a box are joined to its middle. Two opposite triangles of the four are
+  // missing, and the edges of the holes are an eight. A triangle's edge is 1 + sqrt(2).
+  Surface box = open_box({1.0, 1.0, 3.0}, {0.0, 0.0, 0.0});
+  const auto corner = [&](double x, double y) {
+    return static_cast<int>(std::find(box.points.begin(), box.points.end(), Point3{x, y, 3.0}) -
+                            box.points.begin());
+  };
+  const int middle = static_cast<int>(box.points.size());
+  box.triangles.push_back({corner(0.0, 0.0), corner(1.0, 0.0), middle});
+  box.triangles.push_back({corner(1.0, 1.0), corner(0.0, 1.0), middle});
+  box.points.push_back({0.5, 0.5, 3.0});
+  const auto whole = closed(box);
+  REQUIRE(whole);
+  CHECK(whole->repairs.holes == 2);
+  CHECK(whole->repairs.longest_hole == Approx((1.0 + std::sqrt(2.0)) / std::sqrt(11.0)));
+  CHECK(whole->volume == Approx(3.0).epsilon(1e-12));
+
+  // A fin on an edge of a box gives the edge three triangles. A second side closes the fin.
+  Surface finned = box_surface({3.0, 3.0, 1.0});
+  finned.points.push_back({3.1, 3.1, 0.5});
+  finned.triangles.push_back({3, 7, 8});
+  const auto box_alone = closed(finned);
+  REQUIRE(box_alone);
+  CHECK(box_alone->volume == Approx(9.0).epsilon(1e-12));
+}
+
 TEST_CASE("one-sided surfaces and surfaces without volume are rejected", "[surface]") {
   // A projective plane: the six points of half an icosahedron, all joined. Every edge has two
   // triangles, and the surface cannot be oriented.
