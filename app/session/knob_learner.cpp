@@ -12,7 +12,7 @@ using enum MidiNumber::Controller;
 
 bool is_knob(int controller) {
   constexpr int others[] = {0, 32, sustain_pedal, sostenuto_pedal, soft_pedal};
-  return controller < all_sound_off &&
+  return controller < MidiNumber::all_sound_off &&
          std::find(std::begin(others), std::end(others), controller) == std::end(others);
 }
 

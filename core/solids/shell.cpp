@@ -44,7 +44,8 @@ class Halver {
   }
 
   void halve_longest() {
-    const auto [squared, low, high] = longest_.top();
+    const int low = std::get<1>(longest_.top());
+    const int high = std::get<2>(longest_.top());
     longest_.pop();
     const std::vector<int> around = std::move(triangles_.at({low, high}));
     triangles_.erase({low, high});
