@@ -139,6 +139,7 @@ class Chooser {
     Form form;
     std::string name;
     double operations;
+    double share_of_one;              // of one voice, of the operations of all
     std::optional<Accuracy> of_form;  // error of this form alone
     Accuracy accuracy;                // including the error of the parts before
     std::optional<double> measured_ns = {};
@@ -249,8 +250,11 @@ class Chooser {
                                   : std::max({1.0, c.accuracy.cents / budget_.cents,
                                               c.accuracy.t60_percent / budget_.t60_percent});
   }
+  // Most of the time few voices sound, so one voice counts half as much as all of them.
   double cost(const Candidate& c) const {
-    return weight_of(c.method) * (c.measured_ns ? *c.measured_ns : c.operations);
+    constexpr double weight_of_one = 0.5;
+    return weight_of(c.method) * (c.measured_ns ? *c.measured_ns : c.operations) *
+           (1.0 + weight_of_one * c.share_of_one);
   }
 
   // Ranks by excess, then by cost. Among forms with unknown error, the published scheme is first.
@@ -270,9 +274,12 @@ class Chooser {
     const Accuracy accuracy = of_form ? sum_of(*of_form, spent_) : Accuracy{};
     program_.form = std::move(form);
     const double count = operations(program_, load_);
+    Workload one = load_;
+    one.voices = 1;
+    const double share = operations(program_, one) / count;
     std::string name = form_name(program_.form);
     candidates_.push_back(
-        {method, std::move(program_.form), std::move(name), count, of_form, accuracy});
+        {method, std::move(program_.form), std::move(name), count, share, of_form, accuracy});
     if (is_better(candidates_.back(), candidates_[best_])) {
       best_ = candidates_.size() - 1;
     }
