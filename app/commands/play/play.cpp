@@ -165,10 +165,13 @@ class Player {
     open_panel();
     open_midi();
     if (song) {
-      voice_.say("playing " + counted(song->messages.size(), "message", "messages") + " of MIDI, " +
+      voice_.say((options_.is_paused ? "paused: " : "playing ") +
+                 counted(song->messages.size(), "message", "messages") + " of MIDI, " +
                  fixed(song->length_s, 1) + " s");
       session_->song().begin(song->length_s, song->tempos, options_.is_paused);
       player_.emplace(*std::move(song), door_, session_->song());
+    } else if (options_.is_paused) {
+      voice_.say("--paused has no effect without --midi");
     }
     return converse();
   }
