@@ -13,7 +13,7 @@ namespace {
 using std::chrono::nanoseconds;
 using std::chrono::steady_clock;
 
-constexpr std::int64_t awake_ns = 100'000;  // a helper polls for work this long after its last task
+constexpr std::int64_t awake_ns = 400'000;  // a helper polls for work this long after its last task
 // a helper wakes this long before the expected start of a period
 constexpr std::int64_t lead_ns = 60'000;
 constexpr std::int64_t short_nap_ns = 50'000;

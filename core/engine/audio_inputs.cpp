@@ -92,12 +92,12 @@ void AudioInputs::add(Bank<T>& bank, const VoiceGroup& group, std::size_t frames
     for (std::size_t lane = group.first; lane < group.end; ++lane) {
       watch.mark_driven(voices[lane], lane, group.part);
     }
-    bank.filled_part = nullptr;
+    bank.held->filled_part = nullptr;
     AudioInput<T> added;
     added.count = count;
     added.frames = frames;
     added.rests = at_rest || bare_;
-    added.value = bank.value.data() + i * width;
+    added.value = bank.block->value.data() + i * width;
     added.velocity = nullptr;
     added.step = part.program.inputs.size() * width;
     added.width = width;
@@ -106,11 +106,11 @@ void AudioInputs::add(Bank<T>& bank, const VoiceGroup& group, std::size_t frames
       added.samples[sound] = input.samples;
       added.scale[sound] = input.scale;
       added.before[sound] = input.before;
-      added.rest[sound] = bare_ ? T(0) : bank.row[(i + sound) * part.width];
+      added.rest[sound] = bare_ ? T(0) : bank.held->row[(i + sound) * part.width];
     }
     if (!part.program.inputs[i].is_force) {
-      bank.zero_velocities = 0;
-      added.velocity = bank.velocity.data() + i * width;
+      bank.held->zero_velocities = 0;
+      added.velocity = bank.block->velocity.data() + i * width;
     }
     bank.mixer.add_audio(added);
   }

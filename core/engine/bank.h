@@ -57,17 +57,31 @@ struct PartBank {
   Aligned<T> slope;   // [kernel][output][lane]
 };
 
-// The kernels of a part that several threads step. Each has its own buffers.
+// What input buffers hold. Drivers at rest give every frame the same row and no velocity, which
+// stay there from block to block.
 template <class T>
-struct SharedPart {
-  std::vector<std::unique_ptr<KernelTask<T>>> tasks;  // [kernel]
-  std::vector<std::uint32_t> wanted;                  // kernels that step in this block
-  double kernel_ns = 0.0;                             // predicted time of a kernel per sample
-  std::unique_ptr<Crew> crew;  // declared last, so destroyed first; null: one thread
+struct HeldInputs {
+  Aligned<T> row;                            // [input][lane]
+  Aligned<T> common_row;                     // [input] if all lanes are equal
+  const PartBank<T>* filled_part = nullptr;  // has the row in its first `filled_frames` frames
+  std::size_t filled_frames = 0;
+  bool filled_common = false;
+  std::size_t zero_velocities = 0;  // leading ones
+};
+
+// The kernels of all parts, when several threads step them. Each has its own buffers, so that
+// inputs at rest stay in the cache of the thread that reads them.
+template <class T>
+struct SharedKernels {
+  std::vector<std::unique_ptr<KernelTask<T>>> tasks;  // [part][kernel]
+  std::vector<HeldInputs<T>> held;                    // [task]
+  std::vector<std::uint32_t> wanted;                  // tasks of this block
+  std::vector<double> kernel_ns;  // [part] predicted time of a kernel per sample
+  std::unique_ptr<Crew> crew;     // declared last, so destroyed first; null: one thread
 };
 
 template <class T>
-struct Bank : BlockBuffers<T> {
+struct Bank {
   Bank(const Machine& machine, std::size_t voices_in, Isa isa, Executor* executor,
        const Progress& progress)
       : voices(voices_in),
@@ -89,21 +103,24 @@ struct Bank : BlockBuffers<T> {
       outputs_of_one = std::max(outputs_of_one, program.outputs.size());
       nodes = std::max(nodes, program.position.size());
     }
-    this->value.resize(max_block_frames * inputs);
-    this->velocity.resize(this->value.size());
-    this->audio.resize(max_block_frames * audio_coefficients);
-    this->outputs.resize(max_block_frames * most_outputs);
-    row.resize(inputs);
-    common_row.resize(most_inputs);
+    own_block_.value.resize(max_block_frames * inputs);
+    own_block_.velocity.resize(own_block_.value.size());
+    own_block_.audio.resize(max_block_frames * audio_coefficients);
+    own_block_.outputs.resize(max_block_frames * most_outputs);
+    own_held_.row.resize(inputs);
+    own_held_.common_row.resize(most_inputs);
     peak.resize(lanes);
     gain.resize(lanes);
     channels.resize(outputs_of_one);
     x.resize(nodes);
     v.resize(nodes);
-    for (std::size_t p = 0; p < parts.size(); ++p) {
-      shared.push_back(executor != nullptr ? share(p, isa, *executor) : SharedPart<T>());
+    if (executor != nullptr) {
+      share(isa, *executor);
     }
   }
+
+  Bank(const Bank&) = delete;
+  Bank& operator=(const Bank&) = delete;
 
   // Calls use(part, group) for every kernel.
   template <class Use>
@@ -116,29 +133,30 @@ struct Bank : BlockBuffers<T> {
   }
 
   // Computes one segment. For every kernel it calls drive(part, group), steps the kernel if the
-  // result is true, and calls mix(part, group, has_stepped). The kernels of an expensive part are
-  // stepped by several threads; voices are independent, so the result has the same bits. Lanes
-  // from `end` on sleep.
+  // result is true, and calls mix(part, group, has_stepped). Several threads step the kernels if
+  // that takes long enough; voices are independent, so the result has the same bits. Lanes from
+  // `end` on sleep.
   template <class Drive, class Mix>
   void step(std::size_t frames, std::size_t end, Drive&& drive, Mix&& mix) {
     awake_end_ = end;
+    is_shared_ = shared.crew && awake_ns() * static_cast<double>(frames) > least_shared_ns;
+    if (is_shared_) {
+      step_together(frames, drive, mix);
+      return;
+    }
     for (std::size_t p = 0; p < parts.size(); ++p) {
-      if (shared[p].crew && shared[p].kernel_ns * static_cast<double>(frames) > least_shared_ns) {
-        step_together(p, frames, drive, mix);
-        continue;
-      }
       for (std::size_t kernel = 0; kernel < parts[p].kernels.size(); ++kernel) {
         const VoiceGroup group = awake_of(p, kernel);
         is_common = false;
         const bool steps = drive(parts[p], group);
         if (steps) {
           parts[p].kernels[kernel]->step({.frames = frames,
-                                          .value = this->value.data(),
-                                          .velocity = this->velocity.data(),
+                                          .value = block->value.data(),
+                                          .velocity = block->velocity.data(),
                                           .is_common = is_common,
-                                          .is_still = filled_part == &parts[p],
-                                          .audio = this->audio.data(),
-                                          .outputs = this->outputs.data(),
+                                          .is_still = held->filled_part == &parts[p],
+                                          .audio = block->audio.data(),
+                                          .outputs = block->outputs.data(),
                                           .lanes = group.end - group.first});
         }
         mix(parts[p], group, steps);
@@ -148,25 +166,20 @@ struct Bank : BlockBuffers<T> {
 
   // Returns whether a part's kernels accept one input row for all lanes (see is_common).
   bool may_be_common(std::size_t p) const {
-    return !shared[p].crew && parts[p].kernels[0]->takes_common_inputs();
+    return !is_shared_ && parts[p].kernels[0]->takes_common_inputs();
   }
   std::size_t lanes_of_rows(const PartBank<T>& part) const { return is_common ? 1 : part.width; }
 
-  static constexpr double least_shared_ns = 5000.0;  // kernel time per block that pays for threads
+  // Predicted time of the kernels in a segment that pays for threads.
+  static constexpr double least_shared_ns = 20'000.0;
 
   std::size_t voices;
   std::vector<PartBank<T>> parts;
-  std::vector<SharedPart<T>> shared;  // [part]
-  bool is_common = false;             // one input row serves all lanes of the current kernel
+  SharedKernels<T> shared;
+  bool is_common = false;  // one input row serves all lanes of the current kernel
 
-  // Drivers at rest give every frame the same row and no velocity. The fields below cache what the
-  // buffers hold: the row in `filled_frames` frames of `filled_part`, and leading zero velocities.
-  Aligned<T> row;         // [input][lane]
-  Aligned<T> common_row;  // [input] if all lanes are equal
-  const PartBank<T>* filled_part = nullptr;
-  std::size_t filled_frames = 0;
-  bool filled_common = false;
-  std::size_t zero_velocities = 0;
+  BlockBuffers<T>* block = &own_block_;  // of the current kernel
+  HeldInputs<T>* held = &own_held_;      // in `block`
 
   Mixer<T> mixer;
   Aligned<T> peak;        // [lane]
@@ -188,71 +201,83 @@ struct Bank : BlockBuffers<T> {
     return group;
   }
 
-  SharedPart<T> share(std::size_t p, Isa isa, Executor& executor) {
-    PartBank<T>& part = parts[p];
-    SharedPart<T> together;
-    if (part.kernels.size() < 2) {
-      return together;
+  // Returns the predicted time per sample of all kernels with lanes that may be awake.
+  double awake_ns() const {
+    double ns = 0.0;
+    for (std::size_t p = 0; p < parts.size(); ++p) {
+      const std::size_t width = parts[p].width;
+      ns += shared.kernel_ns[p] * static_cast<double>((awake_end_ + width - 1) / width);
     }
-    typename KernelTask<T>::Make make;
-    if (executor.is_live()) {
-      make = [&] { return make_kernel<T>(part.program, voices, isa); };
-    }
+    return ns;
+  }
+
+  void share(Isa isa, Executor& executor) {
     std::vector<Task*> tasks;
-    for (std::unique_ptr<Kernel<T>>& kernel : part.kernels) {
-      together.tasks.push_back(std::make_unique<KernelTask<T>>(
-          kernel, static_cast<const BlockBuffers<T>&>(*this), make));
-      tasks.push_back(together.tasks.back().get());
-      if (executor.is_live() && !together.tasks.back()->can_copy()) {
-        return {};
+    for (PartBank<T>& part : parts) {
+      typename KernelTask<T>::Make make;
+      if (executor.is_live()) {
+        make = [&] { return make_kernel<T>(part.program, voices, isa); };
       }
+      for (std::unique_ptr<Kernel<T>>& kernel : part.kernels) {
+        shared.tasks.push_back(std::make_unique<KernelTask<T>>(kernel, own_block_, make));
+        tasks.push_back(shared.tasks.back().get());
+        if (executor.is_live() && !shared.tasks.back()->can_copy()) {
+          shared = {};
+          return;
+        }
+      }
+      shared.kernel_ns.push_back(
+          estimated_ns(part.program, {.is_double = std::is_same_v<T, double>,
+                                      .isa = isa,
+                                      .voices = static_cast<int>(part.width)}));
     }
-    together.kernel_ns = estimated_ns(part.program, {.is_double = std::is_same_v<T, double>,
-                                                     .isa = isa,
-                                                     .voices = static_cast<int>(part.width)});
-    together.wanted.reserve(tasks.size());
-    together.crew = executor.gather(std::move(tasks));
-    return together;
+    if (tasks.size() < 2) {
+      shared = {};
+      return;
+    }
+    shared.held.resize(tasks.size(), own_held_);
+    shared.wanted.reserve(tasks.size());
+    shared.crew = executor.gather(std::move(tasks));
   }
 
   template <class Drive, class Mix>
-  void step_together(std::size_t p, std::size_t frames, Drive&& drive, Mix&& mix) {
-    SharedPart<T>& together = shared[p];
-    const auto with_buffers_of = [&](KernelTask<T>& task, auto&& use) {
-      std::swap(static_cast<BlockBuffers<T>&>(*this), task.buffers);
-      use();
-      std::swap(static_cast<BlockBuffers<T>&>(*this), task.buffers);
-    };
-    together.wanted.clear();
-    for (std::uint32_t kernel = 0; kernel < together.tasks.size(); ++kernel) {
-      KernelTask<T>& task = *together.tasks[kernel];
-      clear_cache();
-      with_buffers_of(task, [&] {
-        const VoiceGroup group = awake_of(p, kernel);
-        if (drive(parts[p], group)) {
-          task.frames = frames;
-          task.lanes = group.end - group.first;
-          task.is_still = filled_part == &parts[p];
-          together.wanted.push_back(kernel);
+  void step_together(std::size_t frames, Drive&& drive, Mix&& mix) {
+    // Calls use(task, part, group) for every kernel, with the buffers of its task.
+    const auto each_task = [&](auto&& use) {
+      std::uint32_t task = 0;
+      for (std::size_t p = 0; p < parts.size(); ++p) {
+        for (std::size_t kernel = 0; kernel < parts[p].kernels.size(); ++kernel, ++task) {
+          block = &shared.tasks[task]->buffers;
+          held = &shared.held[task];
+          use(task, parts[p], awake_of(p, kernel));
         }
-      });
-    }
-    clear_cache();
-    together.crew->run(together.wanted);
-    auto next = together.wanted.begin();
-    for (std::uint32_t kernel = 0; kernel < together.tasks.size(); ++kernel) {
-      const bool has_stepped = next != together.wanted.end() && *next == kernel;
+      }
+      block = &own_block_;
+      held = &own_held_;
+    };
+    shared.wanted.clear();
+    is_common = false;
+    each_task([&](std::uint32_t i, PartBank<T>& part, const VoiceGroup& group) {
+      if (drive(part, group)) {
+        KernelTask<T>& task = *shared.tasks[i];
+        task.frames = frames;
+        task.lanes = group.end - group.first;
+        task.is_still = held->filled_part == &part;
+        shared.wanted.push_back(i);
+      }
+    });
+    shared.crew->run(shared.wanted);
+    auto next = shared.wanted.begin();
+    each_task([&](std::uint32_t i, PartBank<T>& part, const VoiceGroup& group) {
+      const bool has_stepped = next != shared.wanted.end() && *next == i;
       next += has_stepped ? 1 : 0;
-      with_buffers_of(*together.tasks[kernel],
-                      [&] { mix(parts[p], awake_of(p, kernel), has_stepped); });
-    }
+      mix(part, group, has_stepped);
+    });
   }
 
-  void clear_cache() {
-    filled_part = nullptr;
-    zero_velocities = 0;
-  }
-
+  BlockBuffers<T> own_block_;
+  HeldInputs<T> own_held_;
+  bool is_shared_ = false;  // several threads step this segment
   std::size_t awake_end_ = 0;
 };
 

@@ -294,7 +294,7 @@ Gestures::RowState Gestures::write_row(Bank<T>& bank, const VoiceGroup& group,
   const std::size_t lanes = std::min(part.width, voices.size() - group.first);
   RowState state;
   bool is_new = false;
-  T* row = bank.row.data();
+  T* row = bank.held->row.data();
   for (const InputSlot& slot : part.program.inputs) {
     std::fill(row + lanes, row + part.width, T(0));
     for (std::size_t lane = 0; lane < lanes; ++lane) {
@@ -308,7 +308,7 @@ Gestures::RowState Gestures::write_row(Bank<T>& bank, const VoiceGroup& group,
     row += part.width;
   }
   state.is_uniform &= !state.is_any_moving;
-  bank.filled_part = is_new ? nullptr : bank.filled_part;
+  bank.held->filled_part = is_new ? nullptr : bank.held->filled_part;
   return state;
 }
 
@@ -318,25 +318,25 @@ template <class T>
 void Gestures::fill_constant(Bank<T>& bank, const PartBank<T>& part, std::size_t frames) {
   const std::size_t inputs = part.program.inputs.size();
   const std::size_t step = inputs * bank.lanes_of_rows(part);
-  if (bank.zero_velocities < frames * step) {
-    std::fill_n(bank.velocity.begin(), frames * step, T(0));
-    bank.zero_velocities = frames * step;
+  if (bank.held->zero_velocities < frames * step) {
+    std::fill_n(bank.block->velocity.begin(), frames * step, T(0));
+    bank.held->zero_velocities = frames * step;
   }
-  if (bank.filled_part == &part && bank.filled_frames >= frames &&
-      bank.filled_common == bank.is_common) {
+  if (bank.held->filled_part == &part && bank.held->filled_frames >= frames &&
+      bank.held->filled_common == bank.is_common) {
     return;
   }
-  const T* row = bank.row.data();
+  const T* row = bank.held->row.data();
   if (bank.is_common) {
     for (std::size_t i = 0; i < inputs; ++i) {
-      bank.common_row[i] = row[i * part.width];
+      bank.held->common_row[i] = row[i * part.width];
     }
-    row = bank.common_row.data();
+    row = bank.held->common_row.data();
   }
-  bank.mixer.fill_rows(row, step, frames, bank.value.data());
-  bank.filled_part = &part;
-  bank.filled_frames = frames;
-  bank.filled_common = bank.is_common;
+  bank.mixer.fill_rows(row, step, frames, bank.block->value.data());
+  bank.held->filled_part = &part;
+  bank.held->filled_frames = frames;
+  bank.held->filled_common = bank.is_common;
 }
 
 template <class T>
@@ -356,9 +356,9 @@ void Gestures::fill_inputs(Bank<T>& bank, const VoiceGroup& group, std::size_t f
         continue;
       }
       watch.mark_driven(voices[lane], lane, group.part);
-      bank.filled_part = nullptr;
-      T* value = bank.value.data() + i * part.width + lane - group.first;
-      T* velocity = bank.velocity.data() + i * part.width + lane - group.first;
+      bank.held->filled_part = nullptr;
+      T* value = bank.block->value.data() + i * part.width + lane - group.first;
+      T* velocity = bank.block->velocity.data() + i * part.width + lane - group.first;
       if (slot.is_force) {
         if (mover.waits_for_motion()) {
           std::array<T, 64> x;
@@ -373,7 +373,7 @@ void Gestures::fill_inputs(Bank<T>& bank, const VoiceGroup& group, std::size_t f
           value[n * step] = static_cast<T>(mover.next_force().value);
         }
       } else {
-        bank.zero_velocities = 0;
+        bank.held->zero_velocities = 0;
         mover.fill_positions(frames, step, value, velocity);
       }
     }

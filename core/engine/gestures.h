@@ -61,7 +61,7 @@ class Gestures {
   // the speed stays the same, so that a bent or gliding bow keeps its grip.
   void follow_pitch_changes(const Voices& voices);
 
-  // Writes the drivers' positions before a segment to bank.row.
+  // Writes the drivers' positions before a segment to bank.held->row.
   struct RowState {
     bool is_any_moving = false;  // motion in an awake voice
     bool is_uniform = true;      // nothing moves, and all lanes have the same positions

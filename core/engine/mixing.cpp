@@ -20,7 +20,7 @@ void Mixing::add(Bank<T>& bank, const VoiceGroup& group, const Segment& segment,
   const std::size_t width = part.width;
   constexpr std::size_t pack = widest_bytes / sizeof(T);
   const std::size_t used = group.end - group.first;
-  const Heard<T> heard{.outputs = bank.outputs.data(),
+  const Heard<T> heard{.outputs = bank.block->outputs.data(),
                        .frames = segment.frames,
                        .count = count,
                        .width = width,
@@ -55,14 +55,16 @@ void Mixing::add(Bank<T>& bank, const VoiceGroup& group, const Segment& segment,
     Voice& voice = voices[lane];
     const auto peak = static_cast<double>(bank.peak[lane - group.first]);
     const auto sample = [&](std::size_t n, std::size_t output) {
-      return static_cast<double>(bank.outputs[(n * count + output) * width + lane - group.first]);
+      return static_cast<double>(
+          bank.block->outputs[(n * count + output) * width + lane - group.first]);
     };
     if (!(peak < bound_)) {
       const std::size_t sane = count_sane_frames(segment.frames, count, sample);
       add_one(part.program, voice, segment, 0, sane, sample);
       watch.freeze_unstable(
-          part, sane > 0 ? bank.outputs.data() + (sane - 1) * part.row() : part.last_of(lane), lane,
-          group.part, voices);
+          part,
+          sane > 0 ? bank.block->outputs.data() + (sane - 1) * part.row() : part.last_of(lane),
+          lane, group.part, voices);
       add_constant(part.program, voice, segment, sane, watch.frozen_outputs(lane, group.part));
       bank.gain[lane - group.first] = T(0);
       is_any_unstable = true;
@@ -92,7 +94,7 @@ void Mixing::keep_last(Bank<T>& bank, const VoiceGroup& group, std::size_t frame
                        bool is_any_unstable, const Voices& voices, const EnergyWatch& watch) {
   PartBank<T>& part = bank.parts[group.part];
   T* const last = part.last_of(group.first);
-  std::copy_n(bank.outputs.data() + (frames - 1) * part.row(), part.row(), last);
+  std::copy_n(bank.block->outputs.data() + (frames - 1) * part.row(), part.row(), last);
   for (std::size_t lane = group.first; is_any_unstable && lane < group.end; ++lane) {
     for (std::size_t output = 0; voices[lane].unstable && output < part.program.outputs.size();
          ++output) {

@@ -21,7 +21,7 @@ void differentiate(Bank<T>& bank, const VoiceGroup& group, std::size_t frames) {
     }
     const std::size_t at = group.first / part.width * part.row() + output * part.width;
     for (std::size_t n = 0; n < frames; ++n) {
-      T* const row = bank.outputs.data() + n * part.row() + output * part.width;
+      T* const row = bank.block->outputs.data() + n * part.row() + output * part.width;
       for (std::size_t lane = 0; lane < part.width; ++lane) {
         T& before = part.before[at + lane];
         T& slope = part.slope[at + lane];
@@ -74,7 +74,7 @@ void OutputLevels::apply(Bank<T>& bank, const VoiceGroup& group, std::size_t fra
     if (level.frames == 0 && level.target == 1.0) {
       continue;
     }
-    T* row = bank.outputs.data() + level.output * part.width;
+    T* row = bank.block->outputs.data() + level.output * part.width;
     T factor = static_cast<T>(level.target);
     for (std::size_t n = 0; n < frames; ++n, row += part.row()) {
       if (level.frames > 0) {

@@ -171,7 +171,7 @@ void Parameters::fill_audio(Bank<T>& bank, const VoiceGroup& group, const Segmen
   if (program.audio_coefficients.empty()) {
     return;
   }
-  T* value = bank.audio.data();
+  T* value = bank.block->audio.data();
   bool is_beyond = false;
   for (std::size_t n = segment.at; n < segment.end(); ++n) {
     for (const AudioParameter& audio : program.audio_parameters) {

@@ -77,28 +77,28 @@ void take_over(Bank<T>& bank, PartBank<T>& part, const PartBank<T>& from, const 
     for (std::size_t i = 0; i < program.inputs.size(); ++i) {
       const InputSlot& input = program.inputs[i];
       const std::size_t at = i * part.width + lane - group.first;
-      bank.value[at] = input.is_force ? T(0) : static_cast<T>(bank.x[input.node]);
-      bank.velocity[at] = input.is_force ? T(0) : static_cast<T>(bank.v[input.node]);
+      bank.block->value[at] = input.is_force ? T(0) : static_cast<T>(bank.x[input.node]);
+      bank.block->velocity[at] = input.is_force ? T(0) : static_cast<T>(bank.v[input.node]);
     }
     set_one_sample_before(bank, part, lane);
   }
   if (!any) {
     return;
   }
-  T* audio = bank.audio.data();
+  T* audio = bank.block->audio.data();
   for (const std::uint32_t c : program.audio_coefficients) {
     audio = std::copy_n(coefficients.value.begin() + static_cast<std::ptrdiff_t>(c * part.width),
                         part.width, audio);
   }
   const std::size_t ramp_frames = std::exchange(coefficients.ramp_frames, 0);
   kernel.step({.frames = 1,
-               .value = bank.value.data(),
-               .velocity = bank.velocity.data(),
-               .audio = bank.audio.data(),
-               .outputs = bank.outputs.data()});
-  std::copy_n(bank.outputs.data(), part.row(), part.last_of(group.first));
+               .value = bank.block->value.data(),
+               .velocity = bank.block->velocity.data(),
+               .audio = bank.block->audio.data(),
+               .outputs = bank.block->outputs.data()});
+  std::copy_n(bank.block->outputs.data(), part.row(), part.last_of(group.first));
   const std::size_t first = group.first / part.width * part.row();
-  std::copy_n(bank.outputs.data(), part.row(), part.before.data() + first);
+  std::copy_n(bank.block->outputs.data(), part.row(), part.before.data() + first);
   for (std::size_t lane = group.first; lane < group.end; ++lane) {
     for (std::size_t output = 0; output < program.outputs.size(); ++output) {
       part.slope[first + output * part.width + lane - group.first] =
@@ -133,8 +133,8 @@ bool can_take_over(Bank<T>& bank, const Bank<T>& from, const Voices& voices) {
 
 template <class T>
 void take_over(Bank<T>& bank, const Bank<T>& from, const Voices& voices) {
-  bank.filled_part = nullptr;
-  bank.zero_velocities = 0;
+  bank.held->filled_part = nullptr;
+  bank.held->zero_velocities = 0;
   bank.each_group([&](PartBank<T>& part, const VoiceGroup& group) {
     take_over(bank, part, from.parts[group.part], group, voices);
   });
