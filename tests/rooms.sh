@@ -50,7 +50,7 @@ judge() {
       sees["core/linear_algebra"] = "core core/linear_algebra"
       sees["core/model"] = "core core/laws core/model"
       sees["core/analysis"] = "core core/laws core/linear_algebra core/model core/analysis"
-      sees["core/identification"] = "core core/linear_algebra core/identification"
+      sees["core/identification"] = "core core/linear_algebra core/kernels/isa.h core/identification"
       sees["core/solids"] = "core core/linear_algebra core/solids"
       sees["core/kernels"] = "core/rooms.h core/lanes.h core/groups.h core/sampled_mode.h core/waveguide_places.h core/formula.h core/progress.h core/model/preset/budget.h " \
                              "core/laws core/linear_algebra core/kernels"

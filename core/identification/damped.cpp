@@ -1,103 +1,127 @@
 #include "core/identification/damped.h"
 
 #include <algorithm>
+#include <numeric>
 
-#include "core/linear_algebra/complex.h"
-#include "core/linear_algebra/eigen.h"
+#include "core/identification/damped_step.h"
 
 namespace ressort::identification {
 namespace {
 
 // Samples are processed as a matrix with a block in each column, and all modes at once.
 constexpr std::size_t block_frames = 256;
-constexpr std::size_t blocks_at_once = 32;
+constexpr std::size_t blocks_at_once = panel_rows;
+constexpr std::size_t stretch_frames = block_frames * blocks_at_once;
 constexpr double gone = 34.0;  // Decay in nepers (295 dB) after which a mode is treated as silent.
 
-// The modes that ring in a stretch of samples.
-struct Stretch {
-  Stretch(std::span<const Complex> log_z, std::size_t first, std::size_t frames)
-      : from(first), samples(block_frames, blocks_at_once) {
-    size = std::min(frames - first, block_frames * blocks_at_once);
-    for (std::size_t k = 0; k < log_z.size(); ++k) {
-      if (-log_z[k].real() * static_cast<double>(first) <= gone) {
-        ringing.push_back(k);
-      }
-    }
-    powers = Matrix(block_frames, 2 * ringing.size());
-    for (std::size_t i = 0; i < ringing.size(); ++i) {
-      double* const re = &powers.values[2 * i * block_frames];
+void multiply_here(const Product& given) {
+  static const auto best =
+      kernels::with_isa(kernels::best_isa(), []<kernels::Isa isa>() { return &multiply<isa>; });
+  best(given);
+}
+
+std::size_t padded(std::size_t columns) {
+  return (columns + 3) / 4 * 4;
+}
+
+// The modes, the longest ones first, and their powers in the first block.
+struct Ordered {
+  explicit Ordered(std::span<const Complex> log_z)
+      : order(log_z.size()), powers(block_frames * padded(2 * log_z.size())) {
+    std::iota(order.begin(), order.end(), 0);
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+      return log_z[a].real() > log_z[b].real();
+    });
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      double* const re = &powers[2 * i * block_frames];
       double* const im = re + block_frames;
       re[0] = 1.0;
       for (std::size_t known = 1; known < block_frames; known *= 2) {
-        const Complex step = std::exp(log_z[ringing[i]] * static_cast<double>(known));
+        const Complex step = std::exp(log_z[order[i]] * static_cast<double>(known));
         for (std::size_t n = 0; n < known; ++n) {
           const Complex power = times(step, {re[n], im[n]});
           re[known + n] = power.real();
           im[known + n] = power.imag();
         }
       }
+      steps.push_back(std::exp(log_z[order[i]] * static_cast<double>(block_frames)));
     }
   }
-  double start_of(std::size_t block) const {
-    return static_cast<double>(from + block * block_frames);
+  // Returns the number of modes that ring at this sample.
+  std::size_t ringing_at(std::size_t sample, std::span<const Complex> log_z) const {
+    const auto last = std::partition_point(order.begin(), order.end(), [&](std::size_t k) {
+      return -log_z[k].real() * static_cast<double>(sample) <= gone;
+    });
+    return static_cast<std::size_t>(last - order.begin());
   }
 
-  std::size_t from;
-  std::size_t size;
-  std::vector<std::size_t> ringing;
-  Matrix powers;   // [sample, real and imaginary part of z^n for each mode that rings]
-  Matrix samples;  // [sample, block]
+  std::vector<std::size_t> order;
+  std::vector<double> powers;  // [real and imaginary part of z^n for each mode][n]
+  std::vector<Complex> steps;  // z^256
 };
 
 }  // namespace
 
 void add_damped(std::span<double> samples, std::span<const Complex> c,
                 std::span<const Complex> log_z) {
-  constexpr std::size_t step = block_frames * blocks_at_once;
-  for (std::size_t from = 0; from < samples.size(); from += step) {
-    const Stretch stretch(log_z, from, samples.size());
-    if (stretch.ringing.empty()) {
-      return;
+  if (log_z.empty()) {
+    return;
+  }
+  const Ordered modes(log_z);
+  const std::size_t columns = 2 * log_z.size();
+  std::vector<double> panels(block_frames * columns);
+  for (std::size_t n = 0; n < block_frames; ++n) {
+    for (std::size_t j = 0; j < columns; ++j) {
+      panels[(n / panel_rows * columns + j) * panel_rows + n % panel_rows] =
+          modes.powers[j * block_frames + n];
     }
-    Matrix starts(2 * stretch.ringing.size(), blocks_at_once);
-    for (std::size_t b = 0; b < blocks_at_once; ++b) {
-      for (std::size_t i = 0; i < stretch.ringing.size(); ++i) {
-        const std::size_t k = stretch.ringing[i];
-        const Complex start = times(c[k], std::exp(log_z[k] * stretch.start_of(b)));
-        starts(2 * i, b) = start.real();
-        starts(2 * i + 1, b) = -start.imag();
+  }
+  std::vector<double> starts(columns * blocks_at_once);
+  std::vector<double> sums(stretch_frames);
+  for (std::size_t from = 0; from < samples.size(); from += stretch_frames) {
+    const std::size_t ringing = modes.ringing_at(from, log_z);
+    for (std::size_t i = 0; i < ringing; ++i) {
+      const std::size_t k = modes.order[i];
+      Complex start = times(c[k], std::exp(log_z[k] * static_cast<double>(from)));
+      for (std::size_t b = 0; b < blocks_at_once; ++b, start = times(start, modes.steps[i])) {
+        starts[b * columns + 2 * i] = start.real();
+        starts[b * columns + 2 * i + 1] = -start.imag();
       }
     }
-    const Matrix sums = product(stretch.powers, starts);
-    for (std::size_t n = 0; n < stretch.size; ++n) {
-      samples[from + n] += sums.values[n];
+    multiply_here({panels.data(), panel_rows * columns, block_frames / panel_rows, 2 * ringing,
+                   starts.data(), columns, blocks_at_once, sums.data()});
+    for (std::size_t n = 0; n < std::min(samples.size() - from, stretch_frames); ++n) {
+      samples[from + n] += sums[n];
     }
   }
 }
 
 std::vector<Moments> moments_of(std::span<const double> samples, std::span<const Complex> log_z) {
   std::vector<Moments> sums(log_z.size());
-  constexpr std::size_t step = block_frames * blocks_at_once;
-  for (std::size_t from = 0; from < samples.size(); from += step) {
-    Stretch stretch(log_z, from, samples.size());
-    if (stretch.ringing.empty()) {
-      break;
+  const Ordered modes(log_z);
+  constexpr std::size_t rows = 2 * blocks_at_once;
+  std::vector<double> panels(2 * stretch_frames);  // x[n], then n x[n], with a block in each row
+  std::vector<double> products(rows * padded(2 * log_z.size()));
+  for (std::size_t from = 0; from < samples.size(); from += stretch_frames) {
+    const std::size_t ringing = modes.ringing_at(from, log_z);
+    for (std::size_t i = 0; i < stretch_frames; ++i) {
+      const std::size_t n = i % block_frames;
+      const std::size_t place = n * panel_rows + i / block_frames;
+      panels[place] = from + i < samples.size() ? samples[from + i] : 0.0;
+      panels[stretch_frames + place] = static_cast<double>(n) * panels[place];
     }
-    std::copy_n(samples.begin() + static_cast<std::ptrdiff_t>(from), stretch.size,
-                std::begin(stretch.samples.values));
-    const Matrix zeroth = transposed_product(stretch.powers, stretch.samples);
-    for (std::size_t n = 0; n < stretch.samples.values.size(); ++n) {
-      stretch.samples.values[n] *= static_cast<double>(n % block_frames);
-    }
-    const Matrix first = transposed_product(stretch.powers, stretch.samples);
-    for (std::size_t i = 0; i < stretch.ringing.size(); ++i) {
-      const std::size_t k = stretch.ringing[i];
-      for (std::size_t b = 0; b < blocks_at_once; ++b) {
-        const Complex power = std::exp(log_z[k] * stretch.start_of(b));
-        const Complex sum(zeroth(2 * i, b), zeroth(2 * i + 1, b));
-        const Complex within(first(2 * i, b), first(2 * i + 1, b));
+    multiply_here({panels.data(), stretch_frames, 2, block_frames, modes.powers.data(),
+                   block_frames, padded(2 * ringing), products.data()});
+    for (std::size_t i = 0; i < ringing; ++i) {
+      const std::size_t k = modes.order[i];
+      Complex power = std::exp(log_z[k] * static_cast<double>(from));
+      const double* const re = &products[2 * i * rows];
+      for (std::size_t b = 0; b < blocks_at_once; ++b, power = times(power, modes.steps[i])) {
+        const Complex sum(re[b], re[rows + b]);
+        const Complex within(re[blocks_at_once + b], re[rows + blocks_at_once + b]);
+        const auto start = static_cast<double>(from + b * block_frames);
         sums[k].zeroth += times(power, sum);
-        sums[k].first += times(power, within + stretch.start_of(b) * sum);
+        sums[k].first += times(power, within + start * sum);
       }
     }
   }

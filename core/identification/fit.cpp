@@ -136,6 +136,7 @@ DampedFit::DampedFit(std::span<const std::vector<double>> sound)
     : sound_(sound), constant_(sound.size()), rest_(sound.begin(), sound.end()) {}
 
 void DampedFit::find_rest() {
+  ++version_;
   for (std::size_t c = 0; c < sound_.size(); ++c) {
     rest_[c] = sound_[c];
     for (double& x : rest_[c]) {
@@ -161,12 +162,11 @@ double DampedFit::rest_energy() const {
 
 bool DampedFit::set_poles(const std::vector<Complex>& log_z) {
   const std::size_t channels = sound_.size();
-  modes_.clear();
+  constant_.assign(channels, 0.0);
+  set_modes({});
   for (const Complex pole : log_z) {
     modes_.push_back({pole, std::vector<Complex>(channels)});
   }
-  constant_.assign(channels, 0.0);
-  find_rest();
   const Normal normal(modes_, channels, sound_[0].size(), false);
   for (std::size_t c = 0; c < channels; ++c) {
     const auto step = positive_solution(normal.linear, Gradient(rest_[c], modes_, c).linear);
@@ -265,29 +265,26 @@ void DampedFit::refine(int steps, double settled, const Progress& progress) {
   const std::size_t count = modes_.size();
   const std::size_t channels = sound_.size();
   const std::size_t frames = sound_[0].size();
-  find_rest();
   double energy = rest_energy();
   double damping = 1e-4;
   for (int done = 0; done < steps && count > 0; ++done) {
     const Normal normal(modes_, channels, frames, true);
     Matrix schur = normal.poles;
     Matrix wanted(2 * count, 1);
-    std::vector<Matrix>
-        solved;  // [channel][linear column, pole column], with the residual as the last column.
+    std::vector<Matrix> linear;  // [channel] The gradient by the amplitudes.
     for (std::size_t c = 0; c < channels; ++c) {
       const Gradient gradient(rest_[c], modes_, c);
-      auto both = positive_solution(normal.linear, beside(normal.mixed[c], gradient.linear));
-      if (!both) {
+      const auto taken = positive_form(normal.linear, beside(normal.mixed[c], gradient.linear));
+      if (!taken) {
         return;
       }
-      const Matrix taken = transposed_product(normal.mixed[c], *both);
       for (std::size_t j = 0; j < 2 * count; ++j) {
         for (std::size_t i = 0; i < 2 * count; ++i) {
-          schur(i, j) -= taken(i, j);
+          schur(i, j) -= (*taken)(i, j);
         }
-        wanted(j, 0) += gradient.poles[j] - taken(j, 2 * count);
+        wanted(j, 0) += gradient.poles[j] - (*taken)(j, 2 * count);
       }
-      solved.push_back(*std::move(both));
+      linear.push_back(gradient.linear);
       progress.spend(count * frames + 16 * count * count * count);
     }
     const std::vector<DampedMode> before = modes_;
@@ -301,17 +298,13 @@ void DampedFit::refine(int steps, double settled, const Progress& progress) {
       const auto step = positive_solution(damped, wanted);
       if (step) {
         for (std::size_t c = 0; c < channels; ++c) {
-          const auto linear = [&](std::size_t row) {
-            double sum = solved[c](row, 2 * count);
-            for (std::size_t j = 0; j < 2 * count; ++j) {
-              sum -= solved[c](row, j) * (*step)(j, 0);
-            }
-            return sum;
-          };
-          for (std::size_t k = 0; k < count; ++k) {
-            modes_[k].c[c] = before[k].c[c] + Complex(linear(2 * k), linear(2 * k + 1));
+          Matrix left = linear[c];
+          left.values -= product(normal.mixed[c], *step).values;
+          const auto moved = positive_solution(normal.linear, left);
+          for (std::size_t k = 0; moved && k < count; ++k) {
+            modes_[k].c[c] = before[k].c[c] + Complex((*moved)(2 * k, 0), (*moved)(2 * k + 1, 0));
           }
-          constant_[c] = constant_before[c] + linear(2 * count);
+          constant_[c] = constant_before[c] + (moved ? (*moved)(2 * count, 0) : 0.0);
         }
         for (std::size_t k = 0; k < count; ++k) {
           modes_[k].log_z = before[k].log_z + Complex((*step)(2 * k, 0), (*step)(2 * k + 1, 0));

@@ -56,6 +56,7 @@ class DampedFit {
   const std::vector<double>& constant() const { return constant_; }       // [channel]
   const std::vector<std::vector<double>>& rest() const { return rest_; }  // [channel][sample]
   double rest_energy() const;
+  std::size_t version() const { return version_; }  // Changes with the residual.
 
   // Returns the deviations of all current modes. With `with_poles` the poles are treated as
   // unknown, too, which makes the amplitudes less certain.
@@ -68,6 +69,7 @@ class DampedFit {
   std::vector<DampedMode> modes_;
   std::vector<double> constant_;
   std::vector<std::vector<double>> rest_;
+  std::size_t version_ = 0;
 };
 
 }  // namespace ressort::identification

@@ -149,6 +149,15 @@ class Search {
   }
 
   DampedFit& fit() { return fit_; }
+  // Return the noise of the residual and the deviations of the modes, computed once for each fit.
+  const Noise& noise() {
+    forget_old();
+    return noise_ ? *noise_ : noise_.emplace(fit_.rest());
+  }
+  const std::vector<DampedDeviation>& deviations() {
+    forget_old();
+    return deviations_ ? *deviations_ : deviations_.emplace(fit_.deviations(true));
+  }
 
   // Searches the first `frames` samples of the residual and adds the poles found. Poles damped more
   // than `most_alpha` were out of reach of earlier searches, so they are searched again.
@@ -263,6 +272,14 @@ class Search {
   std::size_t frames() const { return sound_[0].size(); }
 
  private:
+  void forget_old() {
+    if (known_version_ != fit_.version()) {
+      noise_.reset();
+      deviations_.reset();
+      known_version_ = fit_.version();
+    }
+  }
+
   struct Ranked {
     double explained;  // Energy that the pole alone explains, approximately.
     Complex log_z;
@@ -339,8 +356,8 @@ class Search {
   // neighbours only one is removed at a time. Returns their number.
   std::size_t drop_uncertain() {
     const std::vector<DampedMode>& modes = fit_.modes();
-    const std::vector<DampedDeviation> deviations = fit_.deviations(true);
-    const Noise noise(fit_.rest());
+    const std::vector<DampedDeviation>& deviations = this->deviations();
+    const Noise& noise = this->noise();
     std::vector<std::pair<double, std::size_t>> uncertain;  // certainty, mode
     for (std::size_t k = 0; k < modes.size(); ++k) {
       const double certain = certainty(modes[k], deviations[k], noise.variance(modes[k].log_z));
@@ -373,7 +390,7 @@ class Search {
   // the residual would be without it, relative to the noise around it. Returns their number.
   std::size_t drop_unlikely() {
     const std::vector<DampedMode>& modes = fit_.modes();
-    const Noise noise(fit_.rest());
+    const Noise& noise = this->noise();
     std::vector<std::vector<std::size_t>> neighbours(modes.size());
     std::vector<double> variance;
     std::vector<double> floor;
@@ -427,6 +444,9 @@ class Search {
   std::size_t most_;
   const Progress& progress_;
   DampedFit fit_;
+  std::optional<Noise> noise_;
+  std::optional<std::vector<DampedDeviation>> deviations_;
+  std::size_t known_version_ = 0;  // of the fit
   double sound_energy_ = 0.0;
 };
 
@@ -543,10 +563,11 @@ Fate fate_of(const Found& found, double rate_hz, std::size_t frames, bool must_b
   return rings ? Fate::kept : Fate::unfit;
 }
 
-std::vector<Found> all_found(const DampedFit& fit) {
+std::vector<Found> all_found(Search& search) {
   std::vector<Found> all;
-  const Noise noise(fit.rest());
-  const std::vector<DampedDeviation> deviations = fit.deviations(true);
+  const DampedFit& fit = search.fit();
+  const Noise& noise = search.noise();
+  const std::vector<DampedDeviation>& deviations = search.deviations();
   for (std::size_t k = 0; k < fit.modes().size(); ++k) {
     all.push_back({fit.modes()[k], deviations[k]});
     const double scale = std::sqrt(noise.variance_beside(fit.modes()[k].log_z, fit.modes()));
@@ -715,7 +736,7 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
   made.analysed_s = static_cast<double>(frames) / rate_hz;
   const auto fates = [&](bool must_be_known) {
     std::vector<Fate> all;
-    for (Found& found : all_found(search->fit())) {
+    for (Found& found : all_found(*search)) {
       all.push_back(fate_of(found, rate_hz, frames, must_be_known));
       extrapolate_back(found, skipped);
       all.back() =
@@ -738,7 +759,7 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
   double steady_energy = 0.0;
   std::size_t steady = 0;
   const std::vector<Fate> fate = fates(options.least_modes == 0);
-  std::vector<Found> all = all_found(search->fit());
+  std::vector<Found> all = all_found(*search);
   for (std::size_t k = 0; k < all.size(); ++k) {
     extrapolate_back(all[k], skipped);
     if (fate[k] == Fate::kept) {

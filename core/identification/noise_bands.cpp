@@ -28,22 +28,33 @@ std::vector<double> frame_energies(const std::vector<double>& samples, std::size
   return energies;
 }
 
-// Returns the samples between two frequencies.
-std::vector<double> part_between(const std::vector<double>& samples, double low_hz, double high_hz,
-                                 double rate_hz) {
-  Fourier fourier(std::bit_ceil(2 * samples.size()));
-  std::vector<double> padded(fourier.size());
-  std::vector<std::complex<double>> bins(fourier.bins());
-  std::copy(samples.begin(), samples.end(), padded.begin());
-  fourier.forward(padded, bins);
-  for (std::size_t k = 0; k < bins.size(); ++k) {
-    const double hertz = static_cast<double>(k) * rate_hz / static_cast<double>(fourier.size());
-    bins[k] = hertz >= low_hz && hertz < high_hz ? bins[k] : 0.0;
+// The spectrum of a channel.
+struct Spectrum {
+  explicit Spectrum(const std::vector<double>& samples)
+      : fourier(std::bit_ceil(samples.size() * 3 / 2)),
+        bins(fourier.bins()),
+        frames(samples.size()) {
+    std::vector<double> padded = samples;
+    padded.resize(fourier.size());
+    fourier.forward(padded, bins);
   }
-  fourier.inverse(bins, padded);
-  padded.resize(samples.size());
-  return padded;
-}
+  // Returns the samples between two frequencies.
+  std::vector<double> part_between(double low_hz, double high_hz, double rate_hz) {
+    std::vector<std::complex<double>> part(bins.size());
+    for (std::size_t k = 0; k < bins.size(); ++k) {
+      const double hertz = static_cast<double>(k) * rate_hz / static_cast<double>(fourier.size());
+      part[k] = hertz >= low_hz && hertz < high_hz ? bins[k] : 0.0;
+    }
+    std::vector<double> padded(fourier.size());
+    fourier.inverse(part, padded);
+    padded.resize(frames);
+    return padded;
+  }
+
+  Fourier fourier;
+  std::vector<std::complex<double>> bins;
+  std::size_t frames;
+};
 
 }  // namespace
 
@@ -55,15 +66,16 @@ std::vector<NoiseBand> noise_bands(const Identification& found) {
       sound += x * x;
     }
   }
+  std::vector<Spectrum> spectra(found.residual.begin(), found.residual.end());
   std::vector<NoiseBand> bands;
   for (std::size_t b = 0; b + 1 < std::size(edges_hz) && edges_hz[b] < 0.45 * found.rate_hz; ++b) {
     NoiseBand band{.low_hz = edges_hz[b],
                    .high_hz = std::min(edges_hz[b + 1], 0.5 * found.rate_hz)};
     std::vector<double> all;
     std::vector<double> of_channel;
-    for (const std::vector<double>& channel : found.residual) {
+    for (Spectrum& spectrum : spectra) {
       std::vector<double> energies =
-          frame_energies(part_between(channel, band.low_hz, band.high_hz, found.rate_hz), frame);
+          frame_energies(spectrum.part_between(band.low_hz, band.high_hz, found.rate_hz), frame);
       // The steady noise of the room is that of the end.
       std::vector<double> tail(
           energies.begin() + static_cast<std::ptrdiff_t>(energies.size() * 3 / 4), energies.end());

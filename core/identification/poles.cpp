@@ -1,11 +1,11 @@
 #include "core/identification/poles.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 
 #include "core/linear_algebra/complex.h"
+#include "core/linear_algebra/fourier.h"
 
 namespace ressort::identification {
 namespace {
@@ -61,42 +61,34 @@ std::vector<double> lowpass(std::size_t decimation) {
   return taps;
 }
 
-// Returns the band around `centre`, decimated, for all positions where the whole filter lies within
-// the sound.
-std::vector<Complex> band_of(const std::vector<double>& sound, const std::vector<double>& taps,
-                             std::size_t decimation, double centre) {
-  constexpr std::size_t lanes = 8;
-  std::vector<double> re(taps.size());
-  std::vector<double> im(taps.size());
-  for (std::size_t n = 0; n < taps.size(); ++n) {
-    re[n] = taps[n] * std::cos(centre * static_cast<double>(n));
-    im[n] = -taps[n] * std::sin(centre * static_cast<double>(n));
+// Adds a channel to all bands, decimated, for all positions where the whole filter lies within the
+// sound. Band b has its centre at (b + 1/2) pi / decimation, so the filters of all bands are one
+// filter and a Fourier transform: in n = m + 2 p decimation, their oscillation has period 2
+// decimation but for the sign (-1)^p.
+void split(const std::vector<double>& sound, const std::vector<double>& taps,
+           std::size_t decimation, std::vector<Band>& bands) {
+  Fourier fourier(4 * decimation);
+  std::vector<double> folded(fourier.size());
+  std::vector<Complex> bins(fourier.bins());
+  for (Band& band : bands) {
+    band.emplace_back();
   }
-  std::vector<Complex> band;
   for (std::size_t from = 0; from + taps.size() <= sound.size(); from += decimation) {
-    std::array<double, lanes> sum_re{};
-    std::array<double, lanes> sum_im{};
-    const double* const x = sound.data() + from;
-    std::size_t n = 0;
-    for (; n + lanes <= taps.size(); n += lanes) {
-      for (std::size_t lane = 0; lane < lanes; ++lane) {
-        sum_re[lane] += x[n + lane] * re[n + lane];
-        sum_im[lane] += x[n + lane] * im[n + lane];
+    std::fill(folded.begin(), folded.end(), 0.0);
+    double sign = 1.0;
+    for (std::size_t first = 0; first < taps.size(); first += 2 * decimation, sign = -sign) {
+      for (std::size_t m = 0; m < std::min(2 * decimation, taps.size() - first); ++m) {
+        folded[m] += sign * taps[first + m] * sound[from + first + m];
       }
     }
-    for (; n < taps.size(); ++n) {
-      sum_re[0] += x[n] * re[n];
-      sum_im[0] += x[n] * im[n];
+    fourier.forward(folded, bins);
+    // The filter was modulated to the centre; this shifts the result back to frequency 0.
+    constexpr Complex quarter_turns[] = {{1.0, 0.0}, {0.0, -1.0}, {-1.0, 0.0}, {0.0, 1.0}};
+    for (std::size_t b = 0; b < bands.size(); ++b) {
+      const std::size_t bin = 2 * b + 1;
+      bands[b].back().push_back(times(bins[bin], quarter_turns[bin * (from / decimation) % 4]));
     }
-    Complex sum;
-    for (std::size_t lane = 0; lane < lanes; ++lane) {
-      sum += Complex(sum_re[lane], sum_im[lane]);
-    }
-    // The filter was modulated to `centre`; this shifts the result back to frequency 0.
-    band.push_back(sum * std::polar(1.0, -std::fmod(centre * static_cast<double>(from),
-                                                    2.0 * std::numbers::pi)));
   }
-  return band;
 }
 
 double energy_of(const Band& band, std::size_t from, std::size_t to) {
@@ -204,12 +196,13 @@ struct Candidate {
 void find_in(const Candidate& candidate, double loudest, std::size_t decimation, double highest,
              std::vector<Complex>& poles) {
   const std::size_t window = candidate.window;
-  const HermitianEigenpairs pairs = hermitian_eigenpairs(candidate.covariance);
+  const std::size_t most = std::min(most_poles, window / 2);
+  const HermitianEigenpairs pairs = hermitian_eigenpairs(candidate.covariance, most);
   const double median = pairs.values[window / 2];
   const double floor =
       std::max({above_median * median, 1e-15 * pairs.values[window - 1], leak * loudest});
   std::size_t order = 0;
-  while (order < std::min(most_poles, window / 2) && pairs.values[window - 1 - order] > floor) {
+  while (order < most && pairs.values[window - 1 - order] > floor) {
     ++order;
   }
   if (order == 0) {
@@ -218,7 +211,7 @@ void find_in(const Candidate& candidate, double loudest, std::size_t decimation,
   ComplexMatrix basis(window, order);
   for (std::size_t j = 0; j < order; ++j) {
     for (std::size_t i = 0; i < window; ++i) {
-      basis(i, j) = pairs.vectors(i, window - 1 - j);
+      basis(i, j) = pairs.vectors(i, most - 1 - j);
     }
   }
   const auto steps = static_cast<double>(decimation);
@@ -253,22 +246,20 @@ std::vector<Complex> find_poles(std::span<const std::vector<double>> channels,
     return poles;
   }
   const std::vector<double> taps = lowpass(decimation);
+  const double spacing = std::numbers::pi / static_cast<double>(decimation);
+  std::vector<Band> bands(
+      std::min(decimation, static_cast<std::size_t>(std::ceil(search.highest_omega / spacing))));
+  for (const std::vector<double>& channel : channels) {
+    split(channel, taps, decimation, bands);
+    progress.spend(channel.size() * 64);
+  }
   std::vector<Candidate> candidates;
   double loudest_energy = 0.0;
-  for (std::size_t b = 0; b < decimation; ++b) {
-    const double spacing = std::numbers::pi / static_cast<double>(decimation);
-    const double centre = (static_cast<double>(b) + 0.5) * spacing;
-    if (centre - 0.5 * spacing >= search.highest_omega) {
-      break;
-    }
-    Candidate candidate{.band = {}, .centre = centre};
-    for (const std::vector<double>& channel : channels) {
-      candidate.band.push_back(band_of(channel, taps, decimation, centre));
-      progress.spend(channel.size() * 3);
-    }
-    candidate.energy = energy_of(candidate.band, 0, candidate.band[0].size());
-    loudest_energy = std::max(loudest_energy, candidate.energy);
-    candidates.push_back(std::move(candidate));
+  for (Band& band : bands) {
+    const double energy = energy_of(band, 0, band[0].size());
+    const double centre = (static_cast<double>(candidates.size()) + 0.5) * spacing;
+    loudest_energy = std::max(loudest_energy, energy);
+    candidates.push_back({.band = std::move(band), .centre = centre, .energy = energy});
   }
   double loudest = 0.0;
   for (Candidate& candidate : candidates) {

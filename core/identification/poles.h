@@ -30,7 +30,7 @@ std::size_t shortest_for(const PoleSearch& search);
 
 // Returns log z per sample, omega above 0, of the poles that stand above the noise of their band.
 // The channels have equal length and share their poles. Some poles may be spurious; a fit decides.
-// Noise alone yields none. O(samples * 28 * channels + bands * 128^3)
+// Noise alone yields none. O(samples * 64 * channels + bands * 96^3)
 std::vector<Complex> find_poles(std::span<const std::vector<double>> channels,
                                 const PoleSearch& search, const Progress& progress);
 

@@ -18,14 +18,40 @@ Eigen::Map<const Eigen::MatrixXd> map_of(const Matrix& matrix) {
           static_cast<Eigen::Index>(matrix.columns())};
 }
 
+Matrix matrix_of(const Eigen::MatrixXd& given) {
+  Matrix matrix(static_cast<std::size_t>(given.rows()), static_cast<std::size_t>(given.cols()));
+  std::copy_n(given.data(), given.size(), std::begin(matrix.values));
+  return matrix;
+}
+
+// The Cholesky factor of a matrix that is scaled to a unit diagonal.
+struct Factor {
+  static std::optional<Factor> of(const Matrix& a) {
+    const auto given = map_of(a);
+    if (given.size() > 0 && !(given.diagonal().minCoeff() > 0.0)) {
+      return std::nullopt;
+    }
+    Factor factor{given.diagonal().cwiseSqrt().cwiseInverse(), {}};
+    factor.lower.compute(factor.scale.asDiagonal() * given * factor.scale.asDiagonal());
+    return factor.lower.info() == Eigen::Success ? std::optional(factor) : std::nullopt;
+  }
+
+  Eigen::VectorXd scale;
+  Eigen::LLT<Eigen::MatrixXd> lower;
+};
+
 }  // namespace
 
-HermitianEigenpairs hermitian_eigenpairs(const ComplexMatrix& matrix) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXcd> solver(map_of(matrix));
+HermitianEigenpairs hermitian_eigenpairs(const ComplexMatrix& matrix, std::size_t most) {
+  // The vectors of the tridiagonal matrix are real, which halves the work.
+  const Eigen::Tridiagonalization<Eigen::MatrixXcd> reduced(map_of(matrix));
+  Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver;
+  solver.computeFromTridiagonal(reduced.diagonal(), reduced.subDiagonal());
+  Eigen::MatrixXcd vectors = solver.eigenvectors().rightCols(static_cast<Eigen::Index>(most));
+  vectors.applyOnTheLeft(reduced.matrixQ());
   HermitianEigenpairs pairs{Vector(solver.eigenvalues().data(), matrix.rows),
-                            ComplexMatrix(matrix.rows, matrix.rows)};
-  std::copy_n(solver.eigenvectors().data(), pairs.vectors.values.size(),
-              pairs.vectors.values.data());
+                            ComplexMatrix(matrix.rows, most)};
+  std::copy_n(vectors.data(), vectors.size(), pairs.vectors.values.data());
   return pairs;
 }
 
@@ -43,22 +69,23 @@ std::vector<std::complex<double>> shift_eigenvalues(const ComplexMatrix& basis) 
 }
 
 std::optional<Matrix> positive_solution(const Matrix& a, const Matrix& b) {
-  const auto given = map_of(a);
-  if (given.rows() == 0) {
-    return b;
-  }
-  if (!(given.diagonal().minCoeff() > 0.0)) {
+  const std::optional<Factor> factor = Factor::of(a);
+  return factor
+             ? std::optional(matrix_of(factor->scale.asDiagonal() *
+                                       factor->lower.solve(factor->scale.asDiagonal() * map_of(b))))
+             : std::nullopt;
+}
+
+std::optional<Matrix> positive_form(const Matrix& a, const Matrix& b) {
+  const std::optional<Factor> factor = Factor::of(a);
+  if (!factor) {
     return std::nullopt;
   }
-  const Eigen::VectorXd scale = given.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::LLT<Eigen::MatrixXd> factor(scale.asDiagonal() * given * scale.asDiagonal());
-  if (factor.info() != Eigen::Success) {
-    return std::nullopt;
-  }
-  const Eigen::MatrixXd x = scale.asDiagonal() * factor.solve(scale.asDiagonal() * map_of(b));
-  Matrix solved(b.rows(), b.columns());
-  std::copy_n(x.data(), x.size(), std::begin(solved.values));
-  return solved;
+  Eigen::MatrixXd half = factor->scale.asDiagonal() * map_of(b);
+  factor->lower.matrixL().solveInPlace(half);
+  Eigen::MatrixXd form = Eigen::MatrixXd::Zero(half.cols(), half.cols());
+  form.selfadjointView<Eigen::Lower>().rankUpdate(half.transpose());
+  return matrix_of(form.selfadjointView<Eigen::Lower>());
 }
 
 std::complex<double> schur_complement_of_first(ComplexMatrix matrix) {
@@ -81,10 +108,7 @@ std::complex<double> schur_complement_of_first(ComplexMatrix matrix) {
 }
 
 Matrix transposed_product(const Matrix& a, const Matrix& b) {
-  const Eigen::MatrixXd both = map_of(a).transpose() * map_of(b);
-  Matrix made(a.columns(), b.columns());
-  std::copy_n(both.data(), both.size(), std::begin(made.values));
-  return made;
+  return matrix_of(map_of(a).transpose() * map_of(b));
 }
 
 }  // namespace ressort::linear_algebra

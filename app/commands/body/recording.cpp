@@ -90,15 +90,16 @@ int recording_body(const BodyOptions& options) {
   }
   const std::string source = options.input.substr(options.input.rfind('/') + 1);
   const std::vector<NoiseBand> noise = noise_bands(*found);
-  const RecordingParts parts = parts_of(*found, noise);
   if (!options.picture.empty()) {
+    const RecordingParts parts = parts_of(*found, noise);
     if (const int code =
             put_figure(options.picture, recording_figure(*found, parts, source), options.force)) {
       return code;
     }
   }
   if (!options.listen.empty()) {
-    if (auto written = write_parts(options.listen, parts, options.force); !written) {
+    if (auto written = write_parts(options.listen, parts_of(*found, noise), options.force);
+        !written) {
       return reject("--listen: " + written.error().message);
     }
   }
