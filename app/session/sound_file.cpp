@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <cmath>
@@ -162,6 +163,21 @@ struct Tape {
   }
 };
 
+// libsndfile gives RF64 files a chunk of peaks with a time stamp, also if it is told not to.
+// Without the stamp, the same sound gives the same file.
+void clear_time_of_peaks(Tape& tape) {
+  std::array<char, 256> head{};
+  const ssize_t size = pread(tape.descriptor, head.data(), head.size(), 0);
+  const std::string_view text(head.data(), static_cast<std::size_t>(std::max<ssize_t>(0, size)));
+  const std::size_t at = text.substr(0, text.find("data")).find("PEAK");
+  constexpr std::string_view none("\0\0\0\0", 4);
+  constexpr std::size_t to_time = 12;  // after name, size and version
+  if (at != std::string_view::npos &&
+      pwrite(tape.descriptor, none.data(), none.size(), static_cast<off_t>(at + to_time)) < 0) {
+    tape.error = tape.error != 0 ? tape.error : errno;
+  }
+}
+
 }  // namespace
 
 struct SoundWriter::File {
@@ -281,6 +297,7 @@ Result<Done> SoundWriter::write(const float* interleaved, std::size_t frames) {
 
 Result<Done> SoundWriter::close() {
   sf_close(std::exchange(file_->handle, nullptr));
+  clear_time_of_peaks(file_->tape);
   return file_->tape.error == 0 ? file_->file.keep() : file_->failure();
 }
 
