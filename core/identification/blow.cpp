@@ -109,7 +109,7 @@ Clipped find_clipped(const Recording& recording, double peak) {
 
 }  // namespace
 
-Result<Blow> find_blow(const Recording& recording) {
+Result<Blow> find_blow(const Recording& recording, bool skips_clipped) {
   const std::vector<std::vector<double>>& channels = recording.channels;
   if (channels.empty() || channels[0].empty()) {
     return Error{"the recording has no samples"};
@@ -151,7 +151,7 @@ Result<Blow> find_blow(const Recording& recording) {
   const Clipped clipped = find_clipped(recording, largest);
   blow.clipped = clipped.count;
   const auto latest = static_cast<std::size_t>(most_skipped * static_cast<double>(left));
-  if (clipped.end > blow.first && clipped.end - blow.first <= latest) {
+  if (skips_clipped && clipped.end > blow.first && clipped.end - blow.first <= latest) {
     blow.skipped = clipped.end - blow.first;
   }
   const std::size_t first = blow.first + blow.skipped;

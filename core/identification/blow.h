@@ -34,6 +34,6 @@ struct Blow {
 
 // Finds the blow. The error gives the reason if there is none: no samples, samples that are not
 // finite, silence, or a sound that is too short.
-Result<Blow> find_blow(const Recording& recording);
+Result<Blow> find_blow(const Recording& recording, bool skips_clipped = true);
 
 }  // namespace ressort::identification

@@ -244,12 +244,15 @@ class Search {
     });
   }
 
+  // Fits the modes that were kept to the sound.
+  void refit() { fit_.refine(10, settled, progress_); }
+
   // Keeps the `count` modes that explain the most together, not counting those for which `is_kept`
-  // holds. The poles stay.
-  void keep_best(std::size_t count, std::vector<bool> is_kept) {
+  // holds. The poles stay. Returns the number of removed modes.
+  std::size_t keep_best(std::size_t count, std::vector<bool> is_kept) {
     is_kept.resize(fit_.modes().size());
     auto left = static_cast<std::size_t>(std::count(is_kept.begin(), is_kept.end(), false));
-    fit_.eliminate([&](const std::vector<double>& drops) {
+    return fit_.eliminate([&](const std::vector<double>& drops) {
       std::size_t least = drops.size();
       for (std::size_t k = 0; k < drops.size() && left > count; ++k) {
         if (!is_kept[k] && (least == drops.size() || drops[k] < drops[least])) {
@@ -516,9 +519,9 @@ struct Found {
 
 enum class Fate { kept, steady, unfit };
 
-// Returns the energy that the modes leave when they are extrapolated back by `head` samples.
-double rest_from_blow(const DampedFit& later, const std::vector<std::vector<double>>& sound,
-                      std::size_t head) {
+// Returns the modes, extrapolated back by `head` samples.
+DampedFit from_blow(const DampedFit& later, const std::vector<std::vector<double>>& sound,
+                    std::size_t head) {
   std::vector<DampedMode> modes = later.modes();
   for (DampedMode& mode : modes) {
     for (Complex& c : mode.c) {
@@ -527,7 +530,25 @@ double rest_from_blow(const DampedFit& later, const std::vector<std::vector<doub
   }
   DampedFit whole(sound);
   whole.set_modes(std::move(modes));
-  return whole.rest_energy();
+  return whole;
+}
+
+// Returns whether the modes that follow the clipped samples explain the samples between those, too.
+bool explains_clipped(const DampedFit& later, const Blow& whole, std::size_t head) {
+  constexpr double most_unexplained = 0.25;
+  double energy = 0.0;
+  double left = 0.0;
+  const DampedFit fit = from_blow(later, whole.channels, head);
+  for (std::size_t c = 0; c < whole.channels.size(); ++c) {
+    for (std::size_t n = 0; n < head; ++n) {
+      const double x = whole.channels[c][n];
+      if (std::fabs(x) < 0.98 * whole.peak) {
+        energy += x * x;
+        left += fit.rest()[c][n] * fit.rest()[c][n];
+      }
+    }
+  }
+  return left <= most_unexplained * energy;
 }
 
 // Extrapolates the mode back in time.
@@ -613,6 +634,7 @@ std::vector<Unexplained> try_choices(Search search, double energy) {
     if (search.fit().modes().size() >= count) {
       search.keep_likely(count);
       search.keep_best(count, {});
+      search.refit();
       tried.insert(tried.begin(), {count, decibels(search.fit().rest_energy() / energy)});
     }
   }
@@ -696,15 +718,23 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
     return blow.error();
   }
   const double rate_hz = recording.rate_hz;
-  Identification made{.rate_hz = rate_hz,
-                      .onset_s = static_cast<double>(blow->first) / rate_hz,
-                      .analysed_s = static_cast<double>(blow->channels[0].size()) / rate_hz};
-  warn_of_recording(*blow, made);
+  Identification made{.rate_hz = rate_hz, .onset_s = static_cast<double>(blow->first) / rate_hz};
   made.sound = std::move(blow->channels);
   const std::size_t least = std::max(choices[0], options.least_modes);
   const std::size_t most = std::max({least_fitted, least, options.most_modes});
   std::optional<Search> search(std::in_place, made.sound, least, most, progress);
   search_all(*search, rate_hz);
+  if (blow->skipped > 0) {
+    auto whole = find_blow(recording, false);
+    if (!explains_clipped(search->fit(), *whole, blow->skipped)) {
+      blow = std::move(whole);
+      made.sound = std::move(blow->channels);
+      search.emplace(made.sound, least, most, progress);
+      search_all(*search, rate_hz);
+    }
+  }
+  made.analysed_s = static_cast<double>(made.sound[0].size()) / rate_hz;
+  warn_of_recording(*blow, made);
   // A residual at the level of rounding errors contains no blow.
   const double rest_share = search->fit().rest_energy() / std::max(energy_in(made.sound), 1e-300);
   if (const std::size_t head = blow_frames(search->fit().rest(), rate_hz);
@@ -717,7 +747,7 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
     free.start(poles_of(search->fit().modes()));
     const double most_rest = search->fit().rest_energy() + most_left_out * energy_in(made.sound);
     const auto continues_back = [&] {
-      return rest_from_blow(free.fit(), made.sound, head) < most_rest;
+      return from_blow(free.fit(), made.sound, head).rest_energy() < most_rest;
     };
     // The fit moves the poles, so the second test can fail although the first one did not.
     if (continues_back() && (free.finish(), continues_back())) {
@@ -752,7 +782,16 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
   search->remove(are(fates(false), Fate::unfit));
   made.choices = try_choices(*search, std::max(energy_in(made.sound), 1e-300));
   search->keep_likely(options.least_modes);
-  search->keep_best(options.most_modes, are(fates(false), Fate::steady));
+  if (search->keep_best(options.most_modes, are(fates(false), Fate::steady)) > 0 &&
+      options.least_modes > 0) {
+    // As many modes as asked for explain more when they stand for those left out, too.
+    const std::vector<DampedMode> best = search->fit().modes();
+    search->refit();
+    const std::vector<Fate> all = fates(false);
+    if (std::find(all.begin(), all.end(), Fate::unfit) != all.end()) {
+      search->fit().set_modes(best);
+    }
+  }
   search->remove(are(fates(options.least_modes == 0), Fate::unfit));
   std::vector<Found> kept;
   double steady_hz = 0.0;

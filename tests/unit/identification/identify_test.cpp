@@ -266,6 +266,27 @@ TEST_CASE("Clipped samples are extrapolated from the sound after them", "[identi
   CHECK(worst_of(known, found).amplitude_db < 1e-3);
 }
 
+TEST_CASE("Modes that die before the last clipped sample are found in the samples between",
+          "[identify]") {
+  // The slow mode is clipped for ln(1 / 0.7) / 23 s = 15 ms. The fast ones have fallen by 85 dB
+  // then, and have a bandwidth of 200 Hz.
+  const std::vector<KnownMode> known = {
+      {300.0, 0.3, 1.0, 0.0}, {850.0, 0.011, 1.0, 1.0}, {2000.0, 0.011, 1.0, 2.0}};
+  Random random(97);
+  std::vector<double> sound = with_noise(ringing(known, 0.4), 1e-3, random);
+  for (double& x : sound) {
+    x = std::clamp(x, -0.7, 0.7);
+  }
+  const Identification found = identified({sound});
+  for (const KnownMode& mode : known) {
+    INFO(mode.frequency_hz << " Hz");
+    CHECK(std::any_of(found.modes.begin(), found.modes.end(), [&](const IdentifiedMode& other) {
+      return std::fabs(other.frequency_hz.value - mode.frequency_hz) < 100.0;
+    }));
+  }
+  CHECK(found.residual_db < -10.0);
+}
+
 TEST_CASE("A long contact does not change the modes", "[identify]") {
   // A hammer with 2 ms of contact: half a sine, with noise.
   const std::vector<KnownMode> known = {{230.0, 3.0, 0.5, 0.0},
