@@ -412,6 +412,38 @@ expect 1 "failed: File too large" \
   sh -c 'ulimit -f 64; exec "$@"' - "$program" render own.mdl -o again.wav --seconds 10
 cmp -s in.wav again.wav || fail "what was there is lost on a full disk"
 
+# Ctrl-C in each stage of a solid. The meshers never end.
+mkdir meshers
+printf '#!/bin/sh\nexec sleep 60\n' > meshers/gmsh
+printf '#!/bin/sh\nexit 3\n' > meshers/failing
+chmod +x meshers/*
+interrupted() {
+  stage=$1
+  shift
+  rm -f stages.log
+  PATH="$PWD/meshers:$PATH" script -qefc "exec '$program' body box.obj --material steel \
+    -o solid.mdl $*" stages.log > stages &
+  screen=$!
+  for _ in $(seq 200); do
+    grep -q "$stage" stages.log 2> /dev/null && break
+    sleep 0.05
+  done
+  solid=$(cat "/proc/$screen/task/$screen/children")
+  kill -INT "${solid% }"
+  wait "$screen"
+  got=$?
+  [ "$got" = 1 ] && grep -q "$stage" stages.log && grep -q "box.obj: interrupted" stages.log &&
+    [ ! -e solid.mdl ] ||
+    fail "Ctrl-C while $stage: exit $got, saying: $(cat stages.log)"
+}
+interrupted "meshing with gmsh" --mesher gmsh
+cp meshers/gmsh meshers/tetgen
+cp meshers/failing meshers/gmsh
+interrupted "meshing with tetgen"
+cp meshers/failing meshers/tetgen
+interrupted "meshing with a grid" --unknowns 100000
+interrupted "finding its modes" --mesher own --unknowns 10000
+
 # Signals during a render: the rendered part is kept as a valid file.
 for signal in TERM HUP INT; do
   "$program" render own.mdl -q -o "cut$signal.wav" --seconds 86000 &
