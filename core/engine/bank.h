@@ -114,7 +114,9 @@ struct Bank {
     channels.resize(outputs_of_one);
     x.resize(nodes);
     v.resize(nodes);
-    if (executor != nullptr) {
+    std::size_t kernels = 0;
+    each_group([&](PartBank<T>&, const VoiceGroup&) { ++kernels; });
+    if (executor != nullptr && kernels > 1) {
       share(isa, *executor);
     }
   }
@@ -230,10 +232,6 @@ struct Bank {
           estimated_ns(part.program, {.is_double = std::is_same_v<T, double>,
                                       .isa = isa,
                                       .voices = static_cast<int>(part.width)}));
-    }
-    if (tasks.size() < 2) {
-      shared = {};
-      return;
     }
     shared.held.resize(tasks.size(), own_held_);
     shared.wanted.reserve(tasks.size());
