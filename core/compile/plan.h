@@ -77,7 +77,7 @@ struct Choice {
 };
 
 // Chooses the form of every part of the machine: that of `method` if the part has it, otherwise the
-// cheapest form in the worst case.
+// cheapest form in the worst case, where one voice counts half as much as all.
 //
 // Estimates rank the forms. With choice.timings, the forms with estimates up to four times the best
 // are measured, and a form that is 10 % faster than the first in rank replaces it.
