@@ -207,8 +207,8 @@ struct Bank {
   double awake_ns() const {
     double ns = 0.0;
     for (std::size_t p = 0; p < parts.size(); ++p) {
-      const std::size_t width = parts[p].width;
-      ns += shared.kernel_ns[p] * static_cast<double>((awake_end_ + width - 1) / width);
+      const std::size_t kernels = (awake_end_ + parts[p].width - 1) / parts[p].width;
+      ns += shared.kernel_ns[p] * static_cast<double>(kernels);
     }
     return ns;
   }
