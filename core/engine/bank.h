@@ -57,8 +57,8 @@ struct PartBank {
   Aligned<T> slope;   // [kernel][output][lane]
 };
 
-// What input buffers hold. Drivers at rest give every frame the same row and no velocity, which
-// stay there from block to block.
+// The content of input buffers. Drivers at rest give every frame the same row and no velocity, and
+// the buffers keep both from block to block.
 template <class T>
 struct HeldInputs {
   Aligned<T> row;                            // [input][lane]

@@ -784,7 +784,7 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
   search->keep_likely(options.least_modes);
   if (search->keep_best(options.most_modes, are(fates(false), Fate::steady)) > 0 &&
       options.least_modes > 0) {
-    // As many modes as asked for explain more when they stand for those left out, too.
+    // A new fit lets the modes that are kept stand for those that were removed, too.
     const std::vector<DampedMode> best = search->fit().modes();
     search->refit();
     const std::vector<Fate> all = fates(false);

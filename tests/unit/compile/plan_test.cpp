@@ -85,8 +85,8 @@ TEST_CASE("a form that is less than a tenth cheaper does not replace the first i
   }
 }
 
-// With AVX-512, direct steps eight voices in twice the time of one, and grid steps them one by one.
-// One voice counts half as much as all of them.
+// The direct form steps eight voices with AVX-512 in twice the time of one; grid steps them one by
+// one. One voice counts half as much as all of them.
 TEST_CASE("a form that is cheap for one voice may take more for all", "[plan]") {
   const Machine machine = make_machine(
       *generate({.kind = ShapeKind::hexagon, .length = 20, .fixed = FixedPoints::border}), 44100.0,
