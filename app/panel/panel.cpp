@@ -173,9 +173,10 @@ struct WebPanel::Server {
     http.set_payload_max_length(most_body_bytes);
     http.set_tcp_nodelay(true);
     // Exclusive: two instances cannot share a port.
-    http.set_socket_options([](int socket) {
+    http.set_socket_options([this](int socket) {
       const int yes = 1;
       setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+      listening_socket = socket;
     });
   }
 
@@ -194,7 +195,8 @@ struct WebPanel::Server {
   bool bind(int wanted) {
     port = wanted > 0 ? (http.bind_to_port(bind_address, wanted) ? wanted : -1)
                       : http.bind_to_any_port(bind_address);
-    return port > 0;
+    // In the queue of cpp-httplib, only five clients can wait. Others try again after a second.
+    return port > 0 && ::listen(listening_socket, SOMAXCONN) == 0;
   }
 
   void listen() {
@@ -479,6 +481,7 @@ struct WebPanel::Server {
   OscServer& osc;
   httplib::Server http;
   int port = 0;
+  int listening_socket = -1;
   std::unique_ptr<PanelAccess> access;
 
   std::mutex mutex;  // Protects the members below.
