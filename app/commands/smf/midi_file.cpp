@@ -323,6 +323,10 @@ Result<MidiFile> parse_midi_file(Bytes file) {
 
   MidiFile midi;
   Tracks reading(file, midi);
+  if (begin > 0 && !is_chunk(file.first(4), "RIFF")) {
+    reading.warn(
+        0, "ignored " + std::to_string(begin) + " bytes before MThd, such as a MacBinary head");
+  }
   std::uint32_t found = 0;
   std::size_t at = reader.at();
   constexpr std::size_t head_bytes = 8;

@@ -36,10 +36,10 @@ struct MidiFile {
 // Parses channel messages and SysEx and converts ticks to seconds. Ignores other meta events, other
 // chunks, and bytes after the last track. Running status continues after meta events, as most
 // programs write it. Releases at the end the keys and pedals that the file leaves down. Reads files
-// in a RIFF or MacBinary wrapper, and over damage: wrong lengths and counts, real-time messages, an
-// early end, for which it adds warnings. Plays the first sequence of type 2. Errors and warnings
-// have the offset of the byte, from 0. Fails for files longer than a day. O(n log n) in the size of
-// the file, for each of its tracks at worst.
+// in a RIFF wrapper, and over damage: a MacBinary head, wrong lengths and counts, real-time
+// messages, an early end, for which it adds warnings. Plays the first sequence of type 2. Errors
+// and warnings have the offset of the byte, from 0. Fails for files longer than a day. O(n log n)
+// in the size of the file, for each of its tracks at worst.
 Result<MidiFile> parse_midi_file(std::span<const std::uint8_t> file);
 
 // Appends messages at the end that release all keys and pedals that are still down.

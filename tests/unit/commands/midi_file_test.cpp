@@ -233,8 +233,11 @@ TEST_CASE("Wrapped and damaged files play what they have", "[midi_file]") {
           REQUIRE(midi.messages.size() == first + 2);
           CHECK(midi.messages.back().time_s == 1.0);  // a key left down is released at the end
           const bool has_warning = kind.warning[0] != 0;
-          REQUIRE(midi.warnings.size() == (has_warning ? 1U : 0U) + (told == count ? 0U : 1U));
-          CHECK((!has_warning || contains(midi.warnings[0], kind.warning)));
+          const std::size_t wrapped = wrapper.size() == 128 ? 1 : 0;
+          REQUIRE(midi.warnings.size() ==
+                  wrapped + (has_warning ? 1U : 0U) + (told == count ? 0U : 1U));
+          CHECK((wrapped == 0 || midi.warnings[0].starts_with("byte 0: ignored 128 bytes")));
+          CHECK((!has_warning || contains(midi.warnings[wrapped], kind.warning)));
           CHECK((told == count || contains(midi.warnings.back(), "the header says 5 tracks")));
           ++files;
         }
