@@ -90,9 +90,11 @@ std::string unused_keys(const RenderOptions& options, bool is_bare) {
   if (keys.channels && options.midi.empty()) {
     return "--channel has no effect without --midi";
   }
-  return is_bare && has_tuning ? "the tuning has no effect, because no key is played; pass --midi, "
-                                 "or a --score with notes"
-                               : "";
+  const std::string unused = has_tuning ? "the tuning" : options.voices > 0 ? "--voices" : "";
+  if (!is_bare || unused.empty()) {
+    return "";
+  }
+  return unused + " has no effect, because no key is played; pass --midi, or a --score with notes";
 }
 
 // Returns the parameters that the score sets.

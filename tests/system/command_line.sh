@@ -508,6 +508,8 @@ printf 'quit\n' > quit.script
 expect 0 "$silent" "$program" play mute.mdl -a dummy -u off -m none -e quit.script
 expect 0 "would let keys strike it" "$program" play mute.mdl -a dummy -u off -m none -e quit.script
 expect 0 "--paused has no effect" "$program" play -a dummy -u off -m none -e quit.script --paused
+expect 0 "--osc-reply and --osc-allow have no effect with -u off" \
+  "$program" play -a dummy -u off -m none -e quit.script --osc-reply 9000
 expect 0 "wide.toml:3:5: warning: 'K' is kept below 3.99999; above it the model is not stable" \
   "$program" render wide.toml -o wide.wav --seconds 1
 expect 0 "K: 4.5 is beyond the stable range, set to 3.99999" \

@@ -423,6 +423,8 @@ class Player {
       } else {
         voice_.say("playing without OSC: " + osc.error().message);
       }
+    } else if (options_.osc.reply_port != 0 || !options_.osc.allow.empty()) {
+      voice_.say("--osc-reply and --osc-allow have no effect with -u off");
     }
     if (osc_ == nullptr) {
       if (auto osc = OscServer::open_without_udp(process_, *session_, hear);

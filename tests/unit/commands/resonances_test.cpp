@@ -110,9 +110,11 @@ TEST_CASE("options for keys without keys cause a warning", "[resonances]") {
            }) == 1;
   };
   CHECK(has(warnings({.keys = {.a4_hz = 432.0}}), "the tuning has no effect"));
+  CHECK(has(warnings({.voices = 3}), "--voices has no effect"));
   CHECK(has(warnings({.keys = {.channels = 2U}}), "--channel has no effect without --midi"));
   const std::string score = folder.write("keys.score", "0 /note/on 60 100\n");
   CHECK_FALSE(has(warnings({.score = score, .keys = {.a4_hz = 432.0}}), "no effect"));
+  CHECK_FALSE(has(warnings({.score = score, .voices = 3}), "no effect"));
 }
 
 TEST_CASE("a score may come through a pipe", "[resonances]") {
