@@ -71,7 +71,12 @@ int export_to_faust(const ExportOptions& options) {
     std::fputs(text->c_str(), stdout);
     return exit_code::done;
   }
-  return write_output(options.output, *text, options.force);
+  if (const int failure = write_output(options.output, *text, options.force)) {
+    return failure;
+  }
+  std::printf("%s: %s as a FAUST program of %zu bytes\n", options.output.c_str(),
+              scene->name.c_str(), text->size());
+  return exit_code::done;
 }
 
 }  // namespace ressort::commands

@@ -396,17 +396,19 @@ std::string describe_stability(const Instrument& instrument) {
                    fixed(std::max(0.0, margin), 2) + " of the stiffness";
 }
 
-// Returns the name of a control's knob and the number of its controller; of other controls the
-// source.
+// Returns the name of a control's knob and the number of its controller, of a controller without a
+// knob the number, and of other controls the source.
 std::vector<std::string> source_of(const ControlSetting& control, const Instrument& instrument) {
-  if (control.source == ControlSource::controller) {
-    for (const KnobInfo& knob : instrument.knobs) {
-      if (knob.controller == control.number) {
-        return {knob.name, "controller " + std::to_string(knob.controller) + ' '};
-      }
+  if (control.source != ControlSource::controller) {
+    return {source_name(control), ""};
+  }
+  const std::string controller = "controller " + std::to_string(control.number);
+  for (const KnobInfo& knob : instrument.knobs) {
+    if (knob.controller == control.number) {
+      return {knob.name, controller + ' '};
     }
   }
-  return {source_name(control), ""};
+  return {controller, ""};
 }
 
 // Returns a row such as "Ring" or "note" with its effect for every control and controller.

@@ -291,8 +291,12 @@ model mute.mdl '@m mass 1. 0. 0.\n'
 expect 2 "mute.mdl:1:1: error: the model has no output" "$program" export mute.mdl --to faust
 model plate.mdl '@s string 2000 1. 0.1 0.01 0. 0.\n@out1 posOutput [@s 0.5]\n'
 expect 0 "4000 masses and links" "$program" export plate.mdl --to faust -o plate.dsp
+expect 0 "plate.dsp: plate as a FAUST program of $(stat -c %s plate.dsp) bytes" \
+  "$program" export plate.mdl --to faust -o plate.dsp --force
 expect 2 "expected a FAUST file" "$program" export PolyTriangle --to faust -o plate.mdl
 expect 2 "cannot be written" "$program" export PolyTriangle --to faust -o no/such/folder/out.dsp
+expect 0 "K.csv: PolyTriangle, 2 sounds" \
+  "$program" describe PolyTriangle --sweep m_K=0.05:0.1:2 --seconds 0.1 -o K.csv
 
 # Rendering.
 expect 2 "there is no file 'nosuch.wav'" \

@@ -11,6 +11,7 @@
 #include "app/exit_code.h"
 #include "app/session/files.h"
 #include "app/session/timbre/timbre_figures.h"
+#include "app/text.h"
 #include "core/curve.h"
 #include "core/model/language/expression.h"
 
@@ -227,6 +228,8 @@ int sweep(const DescribeOptions& options, const std::function<bool()>& should_co
                              : put_figure(output, *sweep_figure(table, options), options.force)) {
       return code;
     }
+    std::printf("%s: %s, %s\n", output.c_str(), options.name.c_str(),
+                counted(count, "sound", "sounds").c_str());
   }
   if (options.outputs.empty()) {
     std::fputs(csv.c_str(), stdout);

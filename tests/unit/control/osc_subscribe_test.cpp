@@ -175,8 +175,11 @@ TEST_CASE("subscribers receive the positions of named controls", "[osc_subscribe
                  "[[control]]\nfrom = \"cc74\"\nto = \"m_K\"\nname = \"Brightness\"\n"
                  "range = [0.05, 0.15]\n"
                  "[[control]]\nfrom = \"cc16\"\nto = \"in2\"\nname = \"Touch\"\n"
-                 "how = \"touch\"\nrange = [-2.0, 0.0]\n");
+                 "how = \"touch\"\nrange = [-2.0, 0.0]\n"
+                 "[[control]]\nfrom = \"cc2\"\nto = \"m_K\"\nrange = [0.06, 0.07]\n");
   REQUIRE(has(h.say("load knobs"), "knobs: 3 masses"));
+  CHECK(has(h.say("explain"), "Brightness    controller 74 controls m_K, 0.05 to 0.15"));
+  CHECK(has(h.say("explain"), "controller 2  controls m_K, 0.06 to 0.07"));
   h.play();
   Client listener(osc.server->port());
   Client other(osc.server->port());
