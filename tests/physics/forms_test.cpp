@@ -65,12 +65,13 @@ void check_forms(Program program, const Score& score, const std::vector<Isa>& is
     for (const auto& [method, form] : forms) {
       INFO(method_name(method) << " on " << isa_name(isa));
       program.form = form;
-      support::check_double(method, against(support::perform<double>(program, score, isa)));
+      const auto in_double = against(support::perform<double>(program, score, isa));
       const auto in_float = against(support::perform<float>(program, score, isa));
       if (method == Method::direct) {
         direct = in_float;
         check_not_chaotic(direct);
       }
+      support::check_double(method, in_double, in_float, direct);
       support::check_float(method, in_float, direct, is_plain);
       if (loudest > 0.0) {
         taken.insert(method);
