@@ -187,10 +187,6 @@ std::size_t DampedFit::eliminate(
   const std::size_t count = modes_.size();
   const std::size_t columns = 2 * count + 1;
   const Normal normal(modes_, 0, sound_[0].size(), false);
-  auto inverse = positive_solution(normal.linear, identity(columns));
-  if (count == 0 || !inverse) {
-    return 0;
-  }
   Matrix amplitudes(columns, sound_.size());
   for (std::size_t c = 0; c < sound_.size(); ++c) {
     for (std::size_t k = 0; k < count; ++k) {
@@ -199,21 +195,54 @@ std::size_t DampedFit::eliminate(
     }
     amplitudes(columns - 1, c) = constant_[c];
   }
+  const Matrix wanted = product(normal.linear, amplitudes);
+  std::vector<bool> is_removed(count);
+  Matrix inverse(columns, columns);
+  // Inverts the equations without the removed modes. Returns whether this succeeds.
+  const auto invert = [&] {
+    Matrix left = normal.linear;
+    Matrix right = beside(identity(columns), wanted);
+    for (std::size_t i = 0; i < columns - 1; ++i) {
+      for (std::size_t j = 0; j < columns && is_removed[i / 2]; ++j) {
+        left(i, j) = left(j, i) = i == j ? 1.0 : 0.0;
+      }
+      for (std::size_t c = 0; c < sound_.size() && is_removed[i / 2]; ++c) {
+        right(i, columns + c) = 0.0;
+      }
+    }
+    const auto solved = positive_solution(left, right);
+    if (solved) {
+      const auto middle =
+          std::begin(solved->values) + static_cast<std::ptrdiff_t>(inverse.values.size());
+      std::copy(std::begin(solved->values), middle, std::begin(inverse.values));
+      std::copy(middle, std::end(solved->values), std::begin(amplitudes.values));
+    }
+    return solved.has_value();
+  };
+  if (count == 0 || !invert()) {
+    return 0;
+  }
+  // Returns the determinant of the block of mode k, 0 if rounding errors exceed it.
+  const auto determinant = [&](std::size_t k) {
+    const double ad = inverse(2 * k, 2 * k) * inverse(2 * k + 1, 2 * k + 1);
+    const double b = inverse(2 * k + 1, 2 * k);
+    return inverse(2 * k, 2 * k) > 0.0 && ad - b * b > 1e-9 * ad ? ad - b * b : 0.0;
+  };
   // Solves the equation of the block of mode k in the inverse for each channel's amplitude.
   const auto solved = [&](std::size_t k, double re, double im) {
-    const double a = (*inverse)(2 * k, 2 * k);
-    const double b = (*inverse)(2 * k + 1, 2 * k);
-    const double d = (*inverse)(2 * k + 1, 2 * k + 1);
-    const double determinant = std::max(a * d - b * b, 1e-300);
-    return std::pair((d * re - b * im) / determinant, (a * im - b * re) / determinant);
+    const double a = inverse(2 * k, 2 * k);
+    const double b = inverse(2 * k + 1, 2 * k);
+    const double d = inverse(2 * k + 1, 2 * k + 1);
+    return std::pair((d * re - b * im) / determinant(k), (a * im - b * re) / determinant(k));
   };
-  std::vector<bool> is_removed(count);
   std::vector<double> drops(count);
   std::size_t removed = 0;
   for (;; ++removed) {
     for (std::size_t k = 0; k < count; ++k) {
       drops[k] = is_removed[k] ? HUGE_VAL : 0.0;
-      for (std::size_t c = 0; c < sound_.size() && !is_removed[k]; ++c) {
+      // The other modes can replace a mode whose determinant is lost in rounding errors.
+      const bool counts = !is_removed[k] && determinant(k) > 0.0;
+      for (std::size_t c = 0; c < sound_.size() && counts; ++c) {
         const double re = amplitudes(2 * k, c);
         const double im = amplitudes(2 * k + 1, c);
         const auto [x, y] = solved(k, re, im);
@@ -225,10 +254,17 @@ std::size_t DampedFit::eliminate(
       break;
     }
     is_removed[gone] = true;
+    if (!(determinant(gone) > 0.0)) {
+      if (invert()) {
+        continue;
+      }
+      ++removed;
+      break;
+    }
     // The Schur complement of the removed columns.
     const auto take = [&](double* column) {
       const auto [x, y] = solved(gone, column[2 * gone], column[2 * gone + 1]);
-      const double* const first = &(*inverse).values[2 * gone * columns];
+      const double* const first = &inverse.values[2 * gone * columns];
       for (std::size_t i = 0; i < columns; ++i) {
         column[i] -= x * first[i] + y * first[i + columns];
       }
@@ -238,7 +274,7 @@ std::size_t DampedFit::eliminate(
     }
     for (std::size_t j = 0; j < columns; ++j) {
       if (j / 2 != gone && (j / 2 == count || !is_removed[j / 2])) {
-        take(&inverse->values[j * columns]);
+        take(&inverse.values[j * columns]);
       }
     }
   }
@@ -339,8 +375,9 @@ void DampedFit::refine(int steps, double settled, const Progress& progress) {
 std::vector<DampedDeviation> DampedFit::deviations(bool with_poles) const {
   const std::size_t count = modes_.size();
   const std::size_t channels = sound_.size();
-  std::vector<DampedDeviation> all(count,
-                                   {HUGE_VAL, HUGE_VAL, std::vector<double>(channels, HUGE_VAL)});
+  const std::vector<double> none(channels);
+  std::vector<DampedDeviation> all(
+      count, {HUGE_VAL, HUGE_VAL, std::vector<double>(channels, HUGE_VAL), none, none});
   if (count == 0) {
     return all;
   }
@@ -351,7 +388,8 @@ std::vector<DampedDeviation> DampedFit::deviations(bool with_poles) const {
   }
   for (std::size_t k = 0; k < count; ++k) {
     const double variance = 0.5 * ((*inverse)(2 * k, 2 * k) + (*inverse)(2 * k + 1, 2 * k + 1));
-    all[k] = {0.0, 0.0, std::vector<double>(channels, std::sqrt(std::max(0.0, variance)))};
+    all[k] = {0.0, 0.0, std::vector<double>(channels, std::sqrt(std::max(0.0, variance))), none,
+              none};
   }
   if (!with_poles) {
     return all;
@@ -384,6 +422,13 @@ std::vector<DampedDeviation> DampedFit::deviations(bool with_poles) const {
         }
       }
       all[k].c[c] = std::hypot(all[k].c[c], std::sqrt(std::max(0.0, variance)));
+      const double size = std::abs(modes_[k].c[c]);
+      const Complex turn = size > 0.0 ? std::conj(modes_[k].c[c]) / size : 1.0;
+      const auto turned = [&](std::size_t pole) {
+        return Complex(-spread(2 * k, pole), -spread(2 * k + 1, pole)) * turn;
+      };
+      all[k].with_alpha[c] = turned(2 * k).real();
+      all[k].with_omega[c] = turned(2 * k + 1).imag();
     }
   }
   return all;

@@ -29,6 +29,10 @@ struct DampedDeviation {
   double alpha = 0.0;
   double omega = 0.0;
   std::vector<double> c;  // [channel]
+  // [channel] Covariance of an amplitude with its log_z: of the part along the amplitude with the
+  // real part, and of the part across it with the imaginary part.
+  std::vector<double> with_alpha;
+  std::vector<double> with_omega;
 };
 
 class DampedFit {

@@ -551,14 +551,31 @@ bool explains_clipped(const DampedFit& later, const Blow& whole, std::size_t hea
   return left <= most_unexplained * energy;
 }
 
+// Returns the deviation of a part of an amplitude after this many samples, relative to the decay
+// since then. Takes its size and deviation, its covariance with its part of log_z, and the
+// deviation of that.
+double deviation_after(double samples, double size, double own, double covariance, double pole) {
+  if (!(own < HUGE_VAL && pole < HUGE_VAL)) {
+    return HUGE_VAL;
+  }
+  const double moved = samples * size;
+  return std::sqrt(
+      std::max(0.0, own * own + 2.0 * moved * covariance + moved * moved * pole * pole));
+}
+
 // Extrapolates the mode back in time.
 void extrapolate_back(Found& found, double samples) {
+  DampedDeviation& deviation = found.deviation;
+  const double growth = std::exp(-found.mode.log_z.real() * samples);
   for (std::size_t c = 0; c < found.mode.c.size(); ++c) {
+    const double moved = samples * std::abs(found.mode.c[c]);
+    deviation.c[c] = growth * deviation_after(-samples, std::abs(found.mode.c[c]), deviation.c[c],
+                                              deviation.with_alpha[c], deviation.alpha);
+    deviation.with_alpha[c] =
+        growth * (deviation.with_alpha[c] - moved * deviation.alpha * deviation.alpha);
+    deviation.with_omega[c] =
+        growth * (deviation.with_omega[c] - moved * deviation.omega * deviation.omega);
     found.mode.c[c] *= std::exp(-found.mode.log_z * samples);
-    // The start was not observed, so the uncertainty of the pole adds to that of the amplitude.
-    found.deviation.c[c] =
-        std::hypot(found.deviation.c[c] * std::exp(-found.mode.log_z.real() * samples),
-                   std::abs(found.mode.c[c]) * found.deviation.alpha * samples);
   }
 }
 
@@ -594,8 +611,10 @@ std::vector<Found> all_found(Search& search) {
     const double scale = std::sqrt(noise.variance_beside(fit.modes()[k].log_z, fit.modes()));
     all.back().deviation.alpha *= scale;
     all.back().deviation.omega *= scale;
-    for (double& c : all.back().deviation.c) {
-      c *= scale;
+    for (std::size_t c = 0; c < fit.modes()[k].c.size(); ++c) {
+      all.back().deviation.c[c] *= scale;
+      all.back().deviation.with_alpha[c] *= scale * scale;
+      all.back().deviation.with_omega[c] *= scale * scale;
     }
   }
   return all;
@@ -652,15 +671,18 @@ IdentifiedMode measured(const Found& found, double rate_hz, double time_zero) {
   mode.t60_s.value = std::log(1000.0) / (alpha * rate_hz);
   mode.t60_s.deviation = mode.t60_s.value * std::hypot(found.deviation.alpha / alpha, last_digit);
   for (std::size_t c = 0; c < found.mode.c.size(); ++c) {
+    const DampedDeviation& deviation = found.deviation;
     const Complex start = found.mode.c[c] * std::exp(found.mode.log_z * time_zero);
-    const double size = std::abs(start);
-    const double seen = found.deviation.c[c] * std::exp(-alpha * time_zero);
-    const auto deviation = [&](double pole) { return std::hypot(seen, size * pole * time_zero); };
-    mode.amplitude.push_back({size, deviation(found.deviation.alpha)});
+    const double size = std::abs(found.mode.c[c]);
+    const auto after = [&](double covariance, double pole) {
+      return deviation_after(time_zero, size, deviation.c[c], covariance, pole);
+    };
+    mode.amplitude.push_back(
+        {std::abs(start),
+         std::exp(-alpha * time_zero) * after(deviation.with_alpha[c], deviation.alpha)});
+    const double phase = after(deviation.with_omega[c], deviation.omega) / size;
     mode.phase_rad.push_back(
-        {std::arg(start), size > 0.0
-                              ? std::min(std::numbers::pi, deviation(found.deviation.omega) / size)
-                              : std::numbers::pi});
+        {std::arg(start), size > 0.0 ? std::min(std::numbers::pi, phase) : std::numbers::pi});
   }
   return mode;
 }

@@ -98,4 +98,27 @@ TEST_CASE("A fit converges from wrong starts and never gets worse", "[damped]") 
   }
 }
 
+TEST_CASE("Modes that others can replace leave the amplitudes of the rest", "[damped]") {
+  const std::vector<KnownMode> known = {{440.0, 0.2, 1.0, 0.3}, {660.0, 0.1, 0.5, 1.0}};
+  const std::vector<std::vector<double>> sound = {ringing(known, 0.3)};
+  const auto pole = [](double hertz, double t60_s) {
+    return Complex(-std::log(1000.0) / (44100.0 * t60_s), 2.0 * std::numbers::pi * hertz / 44100.0);
+  };
+  std::vector<Complex> poles = {pole(440.0, 0.2), pole(660.0, 0.1)};
+  for (int k = 0; k < 40; ++k) {
+    poles.push_back(pole(400.0 + 4.0 * k, 0.1));  // A bandwidth of 22 Hz.
+  }
+  DampedFit fit(sound);
+  REQUIRE(fit.set_poles(poles));
+  std::size_t next = poles.size();
+  CHECK(fit.eliminate([&](const std::vector<double>& drops) {
+    for (const double drop : drops) {
+      CHECK(drop >= 0.0);
+    }
+    return --next > 1 ? next : poles.size();
+  }) == 40);
+  CHECK(std::abs(fit.modes()[0].c[0] - std::polar(1.0, 0.3)) < 1e-6);
+  CHECK(std::abs(fit.modes()[1].c[0] - std::polar(0.5, 1.0)) < 1e-6);
+}
+
 }  // namespace ressort::damped_test
