@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/engine/voices.h"
+#include "core/kernels/kernel.h"
 
 namespace ressort::engine {
 
