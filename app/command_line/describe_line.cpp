@@ -76,14 +76,16 @@ void add_describe(CLI::App& app, int& code) {
       ->check(within(0.1, 3600.0))
       ->capture_default_str();
   add_settings(*command, options.settings);
-  add_parsed(*command, "--sweep", options.swept, parse_swept,
-             "parameter to sweep: NAME=LOW:HIGH[:STEPS][:log|:linear]");
+  CLI::Option* const sweep = add_parsed(*command, "--sweep", options.swept, parse_swept,
+                                        "parameter to sweep: NAME=LOW:HIGH[:STEPS][:log|:linear]");
   command->add_option("--figures", options.figures, "figures in the .svg of a sweep")
+      ->needs(sweep)
       ->type_name("NAME,...")
       ->delimiter(',')
       ->allow_extra_args(false);
   add_parsed(*command, "--law", options.laws, parse_law,
-             "formula to plot beside a figure: FIGURE=FORMULA");
+             "formula to plot beside a figure: FIGURE=FORMULA")
+      ->needs(sweep);
   add_motion(*command, options.third);
 }
 

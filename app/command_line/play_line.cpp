@@ -148,6 +148,7 @@ void add_play(CLI::App& app, int& code) {
       ->add_option("--web-bind", options.panel.bind_address,
                    "address of the web page; other machines need its token")
       ->type_name("ADDRESS")
+      ->needs(command->get_option("--web"))
       ->capture_default_str();
   command->add_flag("--exit-on-loss", options.exit_on_loss,
                     "exit with 75 when the audio server ends, instead of waiting");

@@ -45,6 +45,8 @@ expect 0 '| `posOutput` | `@MASS [LEVEL]` |' "$program" reference model
 expect 2 "PART" "$program" reference nosuch
 expect 0 "/note/on" "$program" render --help
 expect 2 "--osc-port" "$program" play -u 99999999
+expect 2 "--web-bind requires --web" "$program" play --web-bind 127.0.0.1
+expect 2 "--law requires --sweep" "$program" describe PolyTriangle --law f0_hz=1
 
 # Files.
 expect 2 "there is no model or preset 'nosuch.mdl'" "$program" check nosuch.mdl
