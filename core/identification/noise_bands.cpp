@@ -11,7 +11,8 @@
 namespace ressort::identification {
 namespace {
 
-constexpr double edges_hz[] = {20.0, 150.0, 500.0, 1500.0, 5000.0, 20000.0};
+constexpr double edges_hz[] = {20.0,   100.0,  200.0,  300.0,  450.0,   700.0,   1000.0, 1500.0,
+                               2200.0, 3200.0, 4700.0, 7000.0, 10000.0, 14000.0, 20000.0};
 constexpr double step_s = 0.003;
 constexpr double least_share = 1e-6;
 

@@ -16,12 +16,18 @@
 
 namespace ressort::identification {
 
+// An output of positions alone has no other phases. With a second place whose velocity is heard,
+// x[n] - x[n-1] at 44,100 Hz, the sum A r^n cos(n theta + phi) takes the shares
+// v = r cos(phi) / sin(theta) of the velocity and -sin(phi) - v (1 - cos(theta) / r) of the
+// position, relative to p q.
 struct BodyShape {
-  double hit = 0.0;           // Displacement at the struck place.
-  std::vector<double> heard;  // [channel]
+  double hit = 0.0;              // Displacement at the struck place.
+  std::vector<double> heard;     // [channel]
+  std::vector<double> position;  // [channel] The same beside a velocity.
+  std::vector<double> velocity;  // [channel]
 };
 
 // Returns the shapes in the order of the identified modes.
-std::vector<BodyShape> body_shapes(const Identification& found, double mass);
+std::vector<BodyShape> body_shapes(const std::vector<IdentifiedMode>& modes, double mass);
 
 }  // namespace ressort::identification

@@ -86,6 +86,7 @@ class Bare {
     value_.resize(program_.inputs.size() * lanes());
     velocity_.resize(value_.size());
     outputs_.resize(program_.outputs.size() * lanes());
+    last_ = outputs_;
     for (std::size_t lane = 0; lane < lanes(); ++lane) {
       set_coefficients(lane, program_.parameters, 1.0, false);
       for (const InputSlot& input : program_.inputs) {
@@ -125,6 +126,7 @@ class Bare {
 
   // Steps every lane; returns one lane's outputs.
   std::vector<double> run(std::size_t lane) {
+    last_ = outputs_;
     kernel_->step({.frames = 1,
                    .value = value_.data(),
                    .velocity = velocity_.data(),
@@ -132,11 +134,15 @@ class Bare {
                    .outputs = outputs_.data()});
     return outputs(lane);
   }
+  // Adds the positions and velocities of each channel, without levels.
   std::vector<double> outputs(std::size_t lane) const {  // [channel]
     std::vector<double> values;
     for (std::size_t i = 0; i < program_.outputs.size(); ++i) {
-      values.resize(std::max<std::size_t>(values.size(), program_.outputs[i].channel + 1));
-      values[program_.outputs[i].channel] = static_cast<double>(outputs_[i * lanes() + lane]);
+      const auto& output = program_.outputs[i];
+      values.resize(std::max<std::size_t>(values.size(), output.channel + 1));
+      const auto now = static_cast<double>(outputs_[i * lanes() + lane]);
+      const auto last = static_cast<double>(last_[i * lanes() + lane]);
+      values[output.channel] += output.derivative == 1 ? now - last : now;
     }
     return values;
   }
@@ -150,6 +156,7 @@ class Bare {
   Aligned<T> value_;  // [input][lane]
   Aligned<T> velocity_;
   Aligned<T> outputs_;
+  Aligned<T> last_;
   std::vector<double> before_;  // [lane][input]
 };
 

@@ -13,7 +13,7 @@ namespace ressort::commands {
 namespace {
 
 constexpr double model_rate_hz = 44100.0;
-constexpr double noise_quality = 1.0;  // Q of the modes that carry noise.
+constexpr double noise_quality = 1.5;  // Q of the modes that carry noise.
 
 std::string five_digits(double value) {
   char text[40];
@@ -27,21 +27,87 @@ double power_at(double hertz, const NoiseBand& band) {
   return low * low / (1.0 + low * low) / (1.0 + high * high);
 }
 
-// Returns the rms displacement of a mode of mass 1 under noise of rms 1 in this band.
-double response(double mode_hz, double t60_s, const NoiseBand& band) {
-  const double r = std::pow(10.0, -3.0 / (model_rate_hz * t60_s));
-  const double theta = 2.0 * std::numbers::pi * mode_hz / model_rate_hz;
-  double heard = 0.0;
-  double played = 0.0;
-  for (double hertz = 5.0; hertz < 0.5 * model_rate_hz; hertz += 10.0) {
-    const std::complex<double> back =
-        std::polar(1.0, -2.0 * std::numbers::pi * hertz / model_rate_hz);
-    const std::complex<double> below = 1.0 - 2.0 * r * std::cos(theta) * back + r * r * back * back;
-    const double power = power_at(hertz, band);
-    played += power;
-    heard += power / std::norm(below);
+// A band of noise is heard through a mode of its own.
+struct Carrier {
+  Carrier(const NoiseBand& given, double lowest_hz)
+      : band(given),
+        // The lowest mode sets the pitch, so no carrier is below it.
+        hertz(std::max(1.01 * lowest_hz, std::sqrt(given.low_hz * given.high_hz))),
+        t60_s(std::log(1000.0) * noise_quality / (std::numbers::pi * hertz)) {
+    for (double at_hz = 0.5 * step_hz; at_hz < 0.5 * model_rate_hz; at_hz += step_hz) {
+      played += power_at(at_hz, band);
+      heard += heard_at(at_hz);
+    }
   }
-  return std::sqrt(heard / played);
+  // Returns the power of the displacement for mass 1.
+  double heard_at(double at_hz) const {
+    const double r = std::pow(10.0, -3.0 / (model_rate_hz * t60_s));
+    const double theta = 2.0 * std::numbers::pi * hertz / model_rate_hz;
+    const std::complex<double> back =
+        std::polar(1.0, -2.0 * std::numbers::pi * at_hz / model_rate_hz);
+    return power_at(at_hz, band) /
+           std::norm(1.0 - 2.0 * r * std::cos(theta) * back + r * r * back * back);
+  }
+  // Returns the rms displacement of the mode, with mass 1, under noise of rms 1.
+  double response() const { return std::sqrt(heard / played); }
+  // Returns the share of its power between two frequencies.
+  double share_between(double low_hz, double high_hz) const {
+    double sum = 0.0;
+    for (double at_hz = 0.5 * step_hz; at_hz < std::min(high_hz, 0.5 * model_rate_hz);
+         at_hz += step_hz) {
+      sum += at_hz >= low_hz ? heard_at(at_hz) : 0.0;
+    }
+    return sum / heard;
+  }
+
+  static constexpr double step_hz = 10.0;
+  NoiseBand band;
+  double hertz;
+  double t60_s;
+  double played = 0.0;
+  double heard = 0.0;
+};
+
+// Sets the levels such that the carriers, which overlap, have the energy of each band together
+// (Richardson 1972, Lucy 1974: no level becomes negative).
+void remove_overlap(std::vector<Carrier>& carriers) {
+  constexpr int steps = 100;
+  const std::size_t count = carriers.size();
+  std::vector<double> share;  // [carrier][band]
+  for (const Carrier& carrier : carriers) {
+    for (const Carrier& other : carriers) {
+      share.push_back(carrier.share_between(other.band.low_hz, other.band.high_hz));
+    }
+  }
+  for (std::size_t c = 0; count > 0 && c < carriers[0].band.level.size(); ++c) {
+    std::vector<double> wanted;
+    for (const Carrier& carrier : carriers) {
+      wanted.push_back(carrier.band.level[c] * carrier.band.level[c] * carrier.band.t60_s);
+    }
+    std::vector<double> energy = wanted;
+    for (int step = 0; step < steps; ++step) {
+      std::vector<double> ratio;
+      for (std::size_t b = 0; b < count; ++b) {
+        double sum = 1e-300;
+        for (std::size_t k = 0; k < count; ++k) {
+          sum += share[k * count + b] * energy[k];
+        }
+        ratio.push_back(wanted[b] / sum);
+      }
+      for (std::size_t k = 0; k < count; ++k) {
+        double sum = 0.0;
+        double all = 1e-300;
+        for (std::size_t b = 0; b < count; ++b) {
+          sum += share[k * count + b] * ratio[b];
+          all += share[k * count + b];
+        }
+        energy[k] *= sum / all;
+      }
+    }
+    for (std::size_t k = 0; k < count; ++k) {
+      carriers[k].band.level[c] = std::sqrt(energy[k] / carriers[k].band.t60_s);
+    }
+  }
 }
 
 // Returns the coordinate of a place.
@@ -63,16 +129,47 @@ std::string knob(const std::string& from, const std::string& to, const std::stri
          "\"\nrange = " + range + "\n";
 }
 
+// Returns the modes as they are when their sum is smallest, in the first millisecond, so that they
+// start without a click.
+std::vector<IdentifiedMode> starting_modes(const Identification& found) {
+  constexpr double longest_s = 0.001;
+  std::vector<IdentifiedMode> best;
+  double least = HUGE_VAL;
+  for (double time_s = 0.0; time_s < longest_s; time_s += 1.0 / found.rate_hz) {
+    const double later_s = found.onset_s + time_s - found.time_zero_s;
+    std::vector<IdentifiedMode> modes = found.modes;
+    std::vector<double> sums(found.sound.size());
+    for (IdentifiedMode& mode : modes) {
+      const double decay = std::pow(10.0, -3.0 * later_s / mode.t60_s.value);
+      for (std::size_t c = 0; c < sums.size(); ++c) {
+        mode.amplitude[c].value *= decay;
+        mode.phase_rad[c].value += 2.0 * std::numbers::pi * mode.frequency_hz.value * later_s;
+        sums[c] += mode.amplitude[c].value * std::cos(mode.phase_rad[c].value);
+      }
+    }
+    double square = 0.0;
+    for (const double sum : sums) {
+      square += sum * sum;
+    }
+    if (square < least) {
+      least = square;
+      best = std::move(modes);
+    }
+  }
+  return best;
+}
+
 }  // namespace
 
 std::string played_model(const Identification& found, const std::vector<NoiseBand>& noise,
                          const std::string& label, const std::string& source, double mass) {
-  const std::vector<BodyShape> shapes = body_shapes(found, mass);
+  const std::vector<BodyShape> shapes = body_shapes(starting_modes(found), mass);
   const double lowest_hz = found.modes.front().frequency_hz.value;
   const std::size_t channels = found.sound.size();
   std::vector<std::string> names = {"centre", "hit", "edge"};
   for (std::size_t c = 0; c < channels; ++c) {
     names.push_back("mic" + std::to_string(c + 1));
+    names.push_back("velocity" + std::to_string(c + 1));
   }
   for (std::size_t b = 0; b < noise.size(); ++b) {
     names.push_back("noise" + std::to_string(b + 1));
@@ -83,7 +180,7 @@ std::string played_model(const Identification& found, const std::vector<NoiseBan
       " of noise.\n"
       "# `place` moves the blow from a centre past the recorded place, `hit`, to an\n"
       "# edge. High modes are weaker at the centre and stronger at the edge, by 3 dB\n"
-      "# per octave.\n"
+      "# per octave. The velocities give the modes their phases.\n"
       "@ring param 1.    # scales all decay times\n"
       "@damp param 0.    # additional loss in 1/s per kHz\n"
       "@place param " +
@@ -104,19 +201,21 @@ std::string played_model(const Identification& found, const std::vector<NoiseBan
             print_number(hertz) + " [" + five_digits(t60_s) + "*ring/(1+" +
             five_digits(1e-3 * hertz * t60_s) + "*damp)] " + five_digits(shapes[k].hit / tilt) +
             " " + five_digits(shapes[k].hit) + " " + five_digits(shapes[k].hit * tilt);
-    for (const double heard : shapes[k].heard) {
-      text += " " + five_digits(heard);
+    for (std::size_t c = 0; c < channels; ++c) {
+      text += " " + five_digits(shapes[k].position[c]) + " " + five_digits(shapes[k].velocity[c]);
     }
     text += zeros + "\n";
   }
+  std::vector<Carrier> carriers;
+  for (const NoiseBand& band : noise) {
+    carriers.emplace_back(band, lowest_hz);
+  }
+  remove_overlap(carriers);
   for (std::size_t b = 0; b < noise.size(); ++b) {
-    // The lowest mode sets the pitch, so no carrier of noise is below it.
-    const double hertz = std::max(1.01 * lowest_hz, std::sqrt(noise[b].low_hz * noise[b].high_hz));
-    const double t60_s = std::log(1000.0) * noise_quality / (std::numbers::pi * hertz);
     text += "@" + label + "_n" + std::to_string(b + 1) + " mode @" + label + " " +
-            five_digits(hertz) + " " + five_digits(t60_s) + " 0 0 0";
-    for (const double level : noise[b].level) {
-      text += " " + five_digits(mass * level / response(hertz, t60_s, noise[b]));
+            five_digits(carriers[b].hertz) + " " + five_digits(carriers[b].t60_s) + " 0 0 0";
+    for (const double level : carriers[b].band.level) {
+      text += " " + five_digits(mass * level / carriers[b].response()) + " 0";
     }
     for (std::size_t other = 0; other < noise.size(); ++other) {
       text += other == b ? " 1" : " 0";
@@ -129,8 +228,9 @@ std::string played_model(const Identification& found, const std::vector<NoiseBan
             std::to_string(b + 1) + "]\n";
   }
   for (std::size_t c = 0; c < channels; ++c) {
-    text += "@out" + std::to_string(c + 1) + " posOutput [@" + label + " mic" +
-            std::to_string(c + 1) + "]\n";
+    const std::string number = std::to_string(c + 1);
+    text += "@out" + number + " posOutput [@" + label + " mic" + number + "]\n@out" + number +
+            " velOutput [@" + label + " velocity" + number + "]\n";
   }
   return text;
 }
@@ -144,7 +244,7 @@ std::string played_preset(const Identification& found, const std::vector<NoiseBa
       peak = std::max(peak, std::fabs(x));
     }
   }
-  const std::size_t places = 3 + found.sound.size() + noise.size();
+  const std::size_t places = 3 + 2 * found.sound.size() + noise.size();
   const std::string range = "[0, " + place_of(places, 2) + "]";
   std::string text =
       "model = \"" + model + "\"\ndescription = \"" + source + ": " +

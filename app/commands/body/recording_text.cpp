@@ -116,7 +116,7 @@ std::string label_of_file(const std::string& path) {
 std::string body_model(const Identification& found, const std::string& label,
                        const std::string& source, double mass) {
   const std::vector<std::string> places = places_of(found.sound.size());
-  const std::vector<BodyShape> shapes = body_shapes(found, mass);
+  const std::vector<BodyShape> shapes = body_shapes(found.modes, mass);
   std::string text = header(found, source) + "@" + label + " body " + print_number(mass) + " hit " +
                      joined(places, " ") + "\n";
   for (std::size_t k = 0; k < found.modes.size(); ++k) {
@@ -149,7 +149,7 @@ std::string body_model(const Identification& found, const std::string& label,
 }
 
 std::string identification_json(const Identification& found, double mass) {
-  const std::vector<BodyShape> shapes = body_shapes(found, mass);
+  const std::vector<BodyShape> shapes = body_shapes(found.modes, mass);
   json modes = json::array();
   for (std::size_t k = 0; k < found.modes.size(); ++k) {
     const IdentifiedMode& mode = found.modes[k];

@@ -86,7 +86,7 @@ int resonance_body(const std::vector<Resonance>& resonances, const BodyOptions& 
                            .phase_rad = {{-0.5 * std::numbers::pi}}});  // a sine
   }
   found.sound.resize(1);
-  const auto shapes = identification::body_shapes(found, mass);
+  const auto shapes = identification::body_shapes(found.modes, mass);
   const std::string label = label_of_file(options.output.empty() ? options.input : options.output);
   std::string text = "# " + counted(resonances.size(), "resonance", "resonances") + " of " +
                      options.input.substr(options.input.rfind('/') + 1) +
