@@ -282,7 +282,11 @@ int print_table(const std::vector<std::string>& names, int step) {
 }
 
 // Tests that a bow speaks at all speeds and pressures, from 65 Hz upwards: at its key's pitch,
-// within its attack time, and louder at higher speed. Returns the number of failures.
+// within its attack time, and louder at higher speed. Returns the number of failures. The friction
+// noise decides in which motion a string settles. One note in about 2,000 settles in a motion
+// without the fundamental and may be quieter than a slower stroke. Such a note counts like a late
+// one, and both strokes are repeated with other noise. The same happens to a repeated note with a
+// probability of 1/2000, and to any of the 6,144 notes of four instruments twice with one of 0.2 %.
 int bow(const std::string& name, int count) {
   Player player(name, 48000.0);
   if (!is_bowed(player.scene().preset)) {
@@ -292,27 +296,38 @@ int bow(const std::string& name, int count) {
   std::map<std::string, int> wrong;
   double slowest_s = 0.0;
   const int lowest_key = 36 - player.instrument().transpose;
+  const auto stroke = [&](int key, double pressure, int velocity) {
+    return player.play({{0.0, press(pressure)}, {0.0, note_on(key, velocity)}}, 1.0);
+  };
+  const auto steady_of = [](const Stereo& sound) { return sound.part(0.5, 1.0); };
+  const auto level_of = [&](const Stereo& sound) { return decibels(peak_of(steady_of(sound))); };
   for (int key = lowest_key; key < lowest_key + 48; key += 2) {
     const double hz = wanted_hz(player, key);
     for (int pressed = 0; pressed < count; ++pressed) {
+      const double pressure = static_cast<double>(pressed) / std::max(1, count - 1);
       double before_db = -1e9;
+      int before_velocity = 0;
       for (int fast = 0; fast < count; ++fast) {
-        const double pressure = static_cast<double>(pressed) / std::max(1, count - 1);
         const int velocity = 20 + 107 * fast / std::max(1, count - 1);
-        const Stereo sound =
-            player.play({{0.0, press(pressure)}, {0.0, note_on(key, velocity)}}, 1.0);
-        const Stereo steady = sound.part(0.5, 1.0);
-        const Pitch pitch = pitch_of(steady, hz);
+        const Stereo sound = stroke(key, pressure, velocity);
+        const Pitch pitch = pitch_of(steady_of(sound), hz);
         const double attack = attack_s(sound, true);
-        const double level_db = decibels(peak_of(steady));
+        double level_db = level_of(sound);
         slowest_s = std::max(slowest_s, attack);
         const bool is_late = attack > bowed_attack_s;
+        const bool is_quiet = level_db <= before_db;
         const bool is_off = std::fabs(cents(pitch.heard_hz, hz)) > 50.0;
+        if (is_quiet) {
+          before_db = level_of(stroke(key, pressure, before_velocity));
+          level_db = level_of(stroke(key, pressure, velocity));
+        }
         wrong["late"] += is_late ? 1 : 0;
         wrong["off its pitch"] += is_off ? 1 : 0;
-        wrong["late or off"] += is_late || is_off ? 1 : 0;
-        wrong["no louder"] += level_db <= before_db ? 1 : 0;
+        wrong["no louder"] += is_quiet ? 1 : 0;
+        wrong["any of these"] += is_late || is_off || is_quiet ? 1 : 0;
+        wrong["no louder twice"] += level_db <= before_db ? 1 : 0;
         before_db = level_db;
+        before_velocity = velocity;
         ++notes;
       }
     }
@@ -323,7 +338,7 @@ int bow(const std::string& name, int count) {
   }
   std::printf("\n");
   std::fflush(stdout);
-  return wrong["late or off"] > notes / 20 || wrong["no louder"] > 0 ? 1 : 0;
+  return wrong["any of these"] > notes / 20 || wrong["no louder twice"] > 0 ? 1 : 0;
 }
 
 int run(int argc, char** argv) {
