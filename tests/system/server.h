@@ -202,6 +202,13 @@ class Listener {
     audio_ = jack_port_register(client_, "in", JACK_DEFAULT_AUDIO_TYPE, JackPortIsInput, 0);
     midi_ = jack_port_register(client_, "out", JACK_DEFAULT_MIDI_TYPE, JackPortIsOutput, 0);
     jack_set_process_callback(client_, &Listener::process, this);
+    jack_set_xrun_callback(
+        client_,
+        [](void* self) {
+          ++static_cast<Listener*>(self)->overruns_;
+          return 0;
+        },
+        this);
   }
   ~Listener() { jack_client_close(client_); }
 
@@ -230,6 +237,8 @@ class Listener {
   }
 
   std::size_t frames() const { return at_; }
+  // Returns how often the server said that a client missed its period.
+  int overruns() const { return overruns_; }
   bool wait_for(std::size_t frames) {
     return eventually([&] { return at_ >= frames; }, 180s);
   }
@@ -277,6 +286,7 @@ class Listener {
   std::size_t next_ = 0;
   std::atomic<std::size_t> at_{0};
   std::atomic<bool> is_rolling_{false};
+  std::atomic<int> overruns_{0};
 };
 
 // A silent JACK client with ports to connect by hand.

@@ -322,29 +322,47 @@ TEST_CASE("A bounce is exact: every note is at its frame at any speed", "[jack_m
               took.count());
 }
 
-// PipeWire changes the period when a client with another period comes or goes.
+// PipeWire changes the period when a client with another period comes or goes. A client that misses
+// a period of 16 frames, because another process runs, is heard in another period. A run with
+// such a note is repeated if the server reported missed periods.
 TEST_CASE("Notes stay on their frame while the period changes", "[jack_midi]") {
-  const Server server(1024);
-  Child play(program({"play", click(), "-a", "jack", "-i", "-u", osc_port}));
-  REQUIRE(answers());
-  Listener listener(first_note + (notes + 1) * spacing);
-  listener.plan(clicks());
-  jack_client_t* const host = jack_client_open("host", JackNoStartServer, nullptr);
-  REQUIRE(host != nullptr);
-  listener.start("ressort:out_left", "ressort:midi_in");
-  std::vector<std::size_t> periods(2, 1024);  // [note]
-  for (const jack_nframes_t period : {64u, 2048u, 16u, 512u, 8192u, 128u}) {
-    REQUIRE(listener.wait_for(first_note + (periods.size() - 1) * spacing + spacing / 2));
-    REQUIRE(jack_set_buffer_size(host, period) == 0);
-    CHECK(jack_get_buffer_size(host) == period);
-    periods.insert(periods.end(), 2, period);
+  constexpr int most_runs = 6;
+  std::vector<std::size_t> periods;  // [note]
+  std::vector<std::size_t> late;
+  int overruns = 0;
+  const auto is_exact = [&] {
+    for (std::size_t n = 0; n < periods.size(); ++n) {
+      if (late[n] - periods[n] != late[0] - periods[0]) {
+        return false;
+      }
+    }
+    return true;
+  };
+  for (int run = 0; run == 0 || (run < most_runs && overruns > 0 && !is_exact()); ++run) {
+    const Server server(1024);
+    Child play(program({"play", click(), "-a", "jack", "-i", "-u", osc_port}));
+    REQUIRE(answers());
+    Listener listener(first_note + (notes + 1) * spacing);
+    listener.plan(clicks());
+    jack_client_t* const host = jack_client_open("host", JackNoStartServer, nullptr);
+    REQUIRE(host != nullptr);
+    listener.start("ressort:out_left", "ressort:midi_in");
+    const int before = listener.overruns();
+    periods.assign(2, 1024);
+    for (const jack_nframes_t period : {64u, 2048u, 16u, 512u, 8192u, 128u}) {
+      REQUIRE(listener.wait_for(first_note + (periods.size() - 1) * spacing + spacing / 2));
+      REQUIRE(jack_set_buffer_size(host, period) == 0);
+      CHECK(jack_get_buffer_size(host) == period);
+      periods.insert(periods.end(), 2, period);
+    }
+    REQUIRE(listener.wait_for(first_note + notes * spacing));
+    jack_client_close(host);
+    overruns = listener.overruns() - before;
+    // The listener runs before and after the program, so it hears everything a period later.
+    late = onsets(listener, first_note);
   }
-  REQUIRE(listener.wait_for(first_note + notes * spacing));
-  jack_client_close(host);
-  // The listener runs before and after the program, so it hears everything a period later.
-  const std::vector<std::size_t> late = onsets(listener, first_note);
   for (std::size_t n = 0; n < periods.size(); ++n) {
-    CAPTURE(n, periods[n]);
+    CAPTURE(n, periods[n], overruns);
     CHECK(late[n] - periods[n] == late[0] - periods[0]);  // frames
   }
 }
