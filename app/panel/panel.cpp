@@ -195,7 +195,7 @@ struct WebPanel::Server {
   bool bind(int wanted) {
     port = wanted > 0 ? (http.bind_to_port(bind_address, wanted) ? wanted : -1)
                       : http.bind_to_any_port(bind_address);
-    // In the queue of cpp-httplib, only five clients can wait. Others try again after a second.
+    // The queue of cpp-httplib holds five clients. Other clients try again after a second.
     return port > 0 && ::listen(listening_socket, SOMAXCONN) == 0;
   }
 

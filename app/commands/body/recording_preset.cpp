@@ -34,30 +34,26 @@ struct Carrier {
         // The lowest mode sets the pitch, so no carrier is below it.
         hertz(std::max(1.01 * lowest_hz, std::sqrt(given.low_hz * given.high_hz))),
         t60_s(std::log(1000.0) * noise_quality / (std::numbers::pi * hertz)) {
-    for (double at_hz = 0.5 * step_hz; at_hz < 0.5 * model_rate_hz; at_hz += step_hz) {
-      played += power_at(at_hz, band);
-      heard += heard_at(at_hz);
-    }
-  }
-  // Returns the power of the displacement for mass 1.
-  double heard_at(double at_hz) const {
     const double r = std::pow(10.0, -3.0 / (model_rate_hz * t60_s));
     const double theta = 2.0 * std::numbers::pi * hertz / model_rate_hz;
-    const std::complex<double> back =
-        std::polar(1.0, -2.0 * std::numbers::pi * at_hz / model_rate_hz);
-    return power_at(at_hz, band) /
-           std::norm(1.0 - 2.0 * r * std::cos(theta) * back + r * r * back * back);
+    for (double at_hz = 0.5 * step_hz; at_hz < 0.5 * model_rate_hz; at_hz += step_hz) {
+      const std::complex<double> back =
+          std::polar(1.0, -2.0 * std::numbers::pi * at_hz / model_rate_hz);
+      const double power = power_at(at_hz, band);
+      played += power;
+      heard += power / std::norm(1.0 - 2.0 * r * std::cos(theta) * back + r * r * back * back);
+      heard_below.push_back(heard);
+    }
   }
   // Returns the rms displacement of the mode, with mass 1, under noise of rms 1.
   double response() const { return std::sqrt(heard / played); }
   // Returns the share of its power between two frequencies.
   double share_between(double low_hz, double high_hz) const {
-    double sum = 0.0;
-    for (double at_hz = 0.5 * step_hz; at_hz < std::min(high_hz, 0.5 * model_rate_hz);
-         at_hz += step_hz) {
-      sum += at_hz >= low_hz ? heard_at(at_hz) : 0.0;
-    }
-    return sum / heard;
+    const auto below = [&](double hz) {
+      const auto steps = static_cast<std::size_t>(std::round(hz / step_hz));
+      return steps == 0 ? 0.0 : heard_below[std::min(steps, heard_below.size()) - 1];
+    };
+    return (below(high_hz) - below(low_hz)) / heard;
   }
 
   static constexpr double step_hz = 10.0;
@@ -65,7 +61,8 @@ struct Carrier {
   double hertz;
   double t60_s;
   double played = 0.0;
-  double heard = 0.0;
+  double heard = 0.0;               // for mass 1
+  std::vector<double> heard_below;  // [step] Power below the step's upper end.
 };
 
 // Sets the levels such that the carriers, which overlap, have the energy of each band together
