@@ -89,13 +89,16 @@ int on_process(jack_nframes_t frames, void* self) {
   }
   void* const midi = buffer(jack.midi);
   const std::size_t arrived = jack_midi_get_event_count(midi);
-  const std::size_t count = std::min(arrived, jack.packets.size());
-  jack.process.dropped.add(arrived - count + jack_midi_get_lost_event_count(midi));
-  for (std::size_t i = 0; i < count; ++i) {
-    jack_midi_event_t event;
-    jack_midi_event_get(&event, midi, static_cast<std::uint32_t>(i));
-    jack.packets[i] = {event.time, {event.buffer, event.size}};
+  std::size_t count = 0;
+  // The source of a single connection refills this memory even while a late callback reads it, so
+  // that an event may be gone.
+  for (jack_midi_event_t event; count < std::min(arrived, jack.packets.size()); ++count) {
+    if (jack_midi_event_get(&event, midi, static_cast<std::uint32_t>(count)) != 0) {
+      break;
+    }
+    jack.packets[count] = {event.time, {event.buffer, event.size}};
   }
+  jack.process.dropped.add(arrived - count + jack_midi_get_lost_event_count(midi));
   jack_nframes_t frame = 0;
   jack_time_t now_us = 0;
   jack_time_t next_us = 0;

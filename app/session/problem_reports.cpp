@@ -34,8 +34,10 @@ void ProblemReports::add_lost_events(const Meters& now) {
               now.late - std::exchange(late_seen_, now.late));
   }
   if (now.dropped != dropped_seen_) {
-    dropped_.add("an event was dropped, because more events arrived than can be played",
-                 now.dropped - std::exchange(dropped_seen_, now.dropped));
+    dropped_.add(
+        "an event was dropped, because more events arrived than can be played, or a period was "
+        "missed",
+        now.dropped - std::exchange(dropped_seen_, now.dropped));
   }
 }
 

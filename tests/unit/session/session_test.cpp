@@ -326,7 +326,8 @@ TEST_CASE("Repeated problems are reported once, with their number", "[session]")
   };
   const std::string late_news = "an event came 0.500 s late";
   const std::string lost_news =
-      "an event was dropped, because more events arrived than can be played";
+      "an event was dropped, because more events arrived than can be played, or a period was "
+      "missed";
   for (int patience = 0; patience < 2000 && (count(late_news) < 738 || count(lost_news) < 4096);
        ++patience) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
