@@ -21,11 +21,13 @@ constexpr double lift_s = 1.0;
 constexpr double long_lift_s = 2.2;
 constexpr double pedals_up_s = 0.2;  // after the key
 constexpr double after_s = 2.0;
-constexpr double undamped_after_s = 16.0;  // for presets without damper, which must ring out
-constexpr double body_after_s = 2.0;       // for a body, which no damper touches
+constexpr double undamped_after_s = 16.0;  // for what no damper touches, which must ring out
 
 constexpr double loudest_db = 0.0;
+// at the mean velocity; the bound rises and falls with the square of the velocity, as MIDI's levels
+// do
 constexpr double softest_db = -40.0;
+constexpr double mean_velocity = 73.5;
 constexpr double most_step_db = -60.0;  // relative to the peak
 
 constexpr int sustain_pedal = 64;
@@ -37,6 +39,7 @@ struct Setting {
   std::string said;
   int key = 60;
   int velocity = 100;
+  double softness = 1.0;  // factor of the velocity by the soft pedal
   bool has_move = false;
   bool is_long = false;
   double lifted_s = lift_s;
@@ -115,6 +118,7 @@ Setting random_setting(std::vector<Lever> levers, support::Random& random) {
   }
   if (is_soft) {
     move(0.1, turn(soft_pedal, 1.0), "soft");
+    setting.softness = 0.75;
   }
   setting.key = 36 + static_cast<int>(random.below(61));
   setting.velocity = 20 + static_cast<int>(random.below(108));
@@ -199,7 +203,9 @@ int play_random_settings(Player& player, const std::string& name, int count, std
     };
     expect(is_finite(sound), "not finite", 0.0);
     expect(peak_db <= loudest_db, "too loud", peak_db);
-    expect(peak_db >= softest_db, "too soft", peak_db);
+    const double velocity_db =
+        40.0 * std::log10(setting.velocity * setting.softness / mean_velocity);
+    expect(peak_db >= softest_db + velocity_db, "too soft", peak_db);
     const auto offset_db = [&](double from_s) {
       return decibels(offset_of(sound.part(from_s, from_s + 1.0)));
     };
@@ -225,9 +231,8 @@ int play_random_settings(Player& player, const std::string& name, int count, std
       return decibels(peak_of(sound.part(end_s - 0.2, end_s)) / std::max(peak, 1e-9));
     };
     // A preset without damper, and a body, which no damper touches, must ring out by themselves.
-    for (double more_s = preset.damper_s <= 0.0    ? undamped_after_s
-                         : !preset.through.empty() ? body_after_s
-                                                   : 0.0;
+    const bool is_undamped = preset.damper_s <= 0.0 || !preset.through.empty();
+    for (double more_s = is_undamped ? undamped_after_s : 0.0;
          left_db() > silence_db && more_s > 0.0; more_s -= 2.0) {
       sound = player.continue_playing(2.0);
     }
