@@ -14,6 +14,10 @@ constexpr double loud = 0.02;  // Share of the peak above which the blow has beg
 constexpr double audible = 1e-5;
 constexpr double noise_factor = 5.0;  // Ratio to the noise before the blow.
 constexpr double gap_s = 0.001;       // A pause this long means that the blow has not begun yet.
+constexpr double hop_s = 0.005;       // Two hops are half a period of the lowest tone.
+constexpr std::size_t rise_hops = 3;  // Longest rise of a later blow.
+constexpr double attack = 2.5;        // Least rise of a later blow: 8 dB.
+constexpr double died_away = 0.5;     // Level at which another blow can be told from a beat.
 constexpr double frame_s = 0.01;
 constexpr double least_s = 0.3;  // Shortest analysed length, if the recording is that long.
 // Number of consecutive samples at the peak that count as clipping.
@@ -55,6 +59,36 @@ std::size_t find_onset(const std::vector<double>& loudness, double peak, double 
     onset = loudness[n] > threshold ? n : onset;
   }
   return onset;
+}
+
+// Returns the onset of the last blow before the loudest sample, if a blow whose sound had begun to
+// die away precedes it; otherwise `first`.
+std::size_t find_loudest_blow(const std::vector<double>& loudness, std::size_t first,
+                              double rate_hz) {
+  const auto hop = static_cast<std::size_t>(hop_s * rate_hz);
+  const auto peak = static_cast<std::size_t>(std::max_element(loudness.begin(), loudness.end()) -
+                                             loudness.begin());
+  std::vector<double> levels;  // the largest magnitude of each hop and the next one
+  for (std::size_t at = first; at + 2 * hop <= loudness.size() && at <= peak; at += hop) {
+    const auto begin = loudness.begin() + static_cast<std::ptrdiff_t>(at);
+    levels.push_back(*std::max_element(begin, begin + static_cast<std::ptrdiff_t>(2 * hop)));
+  }
+  double loudest_before = 0.0;
+  std::size_t found = first;
+  for (std::size_t k = 0; k + rise_hops < levels.size(); ++k) {
+    loudest_before = std::max(loudest_before, levels[k]);
+    const bool has_died_away = levels[k] < died_away * loudest_before;
+    const double after =
+        *std::max_element(levels.begin() + static_cast<std::ptrdiff_t>(k),
+                          levels.begin() + static_cast<std::ptrdiff_t>(k + rise_hops + 1));
+    if (has_died_away && after > attack * levels[k] && after > died_away * loudness[peak]) {
+      found = first + (k + 1) * hop;
+      while (loudness[found] < 2.0 * levels[k]) {
+        ++found;
+      }
+    }
+  }
+  return found;
 }
 
 // Returns the number of samples to analyse from the onset: twice as many as exceed the noise at the
@@ -141,7 +175,9 @@ Result<Blow> find_blow(const Recording& recording, bool skips_clipped) {
   if (!(peak > 1e-12 * largest) || peak < 1e-30) {
     return Error{"it is silent: every sample is the same"};
   }
-  Blow blow{.first = find_onset(loudness, peak, recording.rate_hz), .peak = peak};
+  const std::size_t onset = find_onset(loudness, peak, recording.rate_hz);
+  Blow blow{.first = find_loudest_blow(loudness, onset, recording.rate_hz), .peak = peak};
+  blow.is_first = blow.first == onset;
   const std::size_t left = frames - blow.first;
   blow.length_s = static_cast<double>(left) / recording.rate_hz;
   if (blow.length_s < shortest_ring_s) {

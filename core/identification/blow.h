@@ -1,4 +1,4 @@
-// core/identification: finds the single blow of a recording: its onset, and how much of the sound
+// core/identification: finds the loudest blow of a recording: its onset, and how much of the sound
 // after it is worth analysing. [any thread but audio]
 #pragma once
 
@@ -22,6 +22,7 @@ inline constexpr double shortest_ring_s = 0.02;  // A shorter sound cannot be an
 
 struct Blow {
   std::size_t first = 0;  // Sample of the recording where the blow begins.
+  bool is_first = true;   // No other blow precedes it.
   // Samples skipped after `first`, because they or their neighbours are clipped.
   std::size_t skipped = 0;
   // The sound that follows: the ringing, then some noise.

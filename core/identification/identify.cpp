@@ -719,6 +719,10 @@ void warn_of_recording(const Blow& blow, Identification& found) {
                    " ms are extrapolated from the sound that follows"
              : "some modes may be spurious and some amplitudes too small"));
   }
+  if (!blow.is_first) {
+    found.warnings.push_back("it has several blows; the loudest one is used, which begins at " +
+                             number("%.3g", found.onset_s) + " s");
+  }
   if (blow.offset > 0.01) {
     found.warnings.push_back("it has an offset (DC) of " + number("%.0f", 100.0 * blow.offset) +
                              " % of its peak, which is removed");

@@ -235,6 +235,38 @@ TEST_CASE("IR-T7: noise alone gives an error", "[identify]") {
   }
 }
 
+TEST_CASE("The loudest of several blows is used, with a warning", "[identify]") {
+  const std::vector<KnownMode> known = {{700.0, 0.3, 1.0, 0.3}, {1600.0, 0.2, 0.7, -1.0}};
+  const std::vector<double> blow = ringing(known, 1.0);
+  const std::size_t second = 4410;
+  const auto twice = [&](double factor) {
+    std::vector<double> sound(second + blow.size());
+    for (std::size_t n = 0; n < blow.size(); ++n) {
+      sound[n] += blow[n];
+      sound[n + second] += factor * blow[n];
+    }
+    return sound;
+  };
+  SECTION("the second is louder") {
+    const Identification found = identified({twice(2.0)});
+    CHECK(std::fabs(found.onset_s - 0.1) < 1.5 / 44100.0);
+    CHECK(worst_of(known, found, 0.1).frequency_hz < 1e-6);
+    REQUIRE(found.warnings.size() == 1);
+    CHECK(found.warnings[0] ==
+          "it has several blows; the loudest one is used, which begins at 0.1 s");
+  }
+  SECTION("the first is louder") {
+    CHECK(identified({twice(0.3)}).onset_s == 0.0);
+  }
+  SECTION("two modes beat") {
+    // The envelope |exp(-a n) - exp(-b n + i w n)| begins at 0 and has nulls 50 ms apart.
+    const std::vector<KnownMode> close = {{700.0, 3.0, 1.0, 0.0}, {720.0, 3.0, -1.0, 0.0}};
+    const Identification found = identified({ringing(close, 1.0)});
+    CHECK(found.onset_s < 0.002);
+    CHECK(found.warnings.empty());
+  }
+}
+
 TEST_CASE("Hum and an offset are removed with a warning", "[identify]") {
   const std::vector<KnownMode> known = {{440.0, 1.0, 1.0, 0.0}};
   Random random(81);
