@@ -31,6 +31,7 @@ constexpr std::size_t choices[] = {40, 20, 10, 5};
 constexpr double rounding = 1e-24;
 // A fit ends when a step reduces the residual's energy by less than this share.
 constexpr double settled = 1e-3;
+constexpr double much_more = 1.12;  // 0.5 dB, the energy that dropped modes may have explained.
 constexpr double roughly_settled = 1e-2;  // The same between two searches.
 constexpr double lowest_hz = 15.0;
 constexpr double least_quality = 0.5;
@@ -149,6 +150,7 @@ class Search {
   }
 
   DampedFit& fit() { return fit_; }
+  double rest_energy() const { return fit_.rest_energy(); }
   // Return the noise of the residual and the deviations of the modes, computed once for each fit.
   const Noise& noise() {
     forget_old();
@@ -230,7 +232,7 @@ class Search {
   void finish() {
     progress_.stage("fitting the modes to the sound");
     fit_.refine(10, settled, progress_);
-    keep_likely(least_);
+    keep_likely(least_, true);
   }
 
   // Removes the modes for which `is_wrong` holds.
@@ -264,11 +266,25 @@ class Search {
     });
   }
 
-  // Keeps only modes that stand above the noise, but at least this many.
-  void keep_likely(std::size_t least) {
+  // Keeps only modes that stand above the noise, but at least this many. With `keeps_groups`,
+  // uncertain modes are kept if the sound cannot be explained without them: each mode of a group
+  // can be uncertain while the group is not.
+  void keep_likely(std::size_t least, bool keeps_groups) {
     least_ = least;
-    for (int round = 0; round < 20 && drop_unlikely() + drop_uncertain() > 0; ++round) {
+    bool drops_uncertain = true;
+    for (int round = 0; round < 20; ++round) {
+      const std::size_t unlikely = drop_unlikely();
+      const std::vector<DampedMode> before = fit_.modes();
+      const double most_rest = much_more * fit_.rest_energy();
+      const std::size_t uncertain = drops_uncertain ? drop_uncertain() : 0;
+      if (unlikely + uncertain == 0) {
+        return;
+      }
       fit_.refine(10, settled, progress_);
+      if (keeps_groups && uncertain > 0 && fit_.rest_energy() > most_rest) {
+        drops_uncertain = false;
+        fit_.set_modes(before);
+      }
     }
   }
 
@@ -651,7 +667,7 @@ std::vector<Unexplained> try_choices(Search search, double energy) {
   std::vector<Unexplained> tried;
   for (const std::size_t count : choices) {
     if (search.fit().modes().size() >= count) {
-      search.keep_likely(count);
+      search.keep_likely(count, true);
       search.keep_best(count, {});
       search.refit();
       tried.insert(tried.begin(), {count, decibels(search.fit().rest_energy() / energy)});
@@ -807,23 +823,44 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
   };
   search->remove(are(fates(false), Fate::unfit));
   made.choices = try_choices(*search, std::max(energy_in(made.sound), 1e-300));
-  search->keep_likely(options.least_modes);
-  if (search->keep_best(options.most_modes, are(fates(false), Fate::steady)) > 0 &&
-      options.least_modes > 0) {
-    // A new fit lets the modes that are kept stand for those that were removed, too.
-    const std::vector<DampedMode> best = search->fit().modes();
-    search->refit();
-    const std::vector<Fate> all = fates(false);
-    if (std::find(all.begin(), all.end(), Fate::unfit) != all.end()) {
-      search->fit().set_modes(best);
+  bool must_be_known = options.least_modes == 0;
+  const auto reduce = [&](bool keeps_groups) {
+    search->keep_likely(options.least_modes, keeps_groups);
+    if (search->keep_best(options.most_modes, are(fates(false), Fate::steady)) > 0 &&
+        options.least_modes > 0) {
+      // A new fit lets the modes that are kept stand for those that were removed, too.
+      const std::vector<DampedMode> best = search->fit().modes();
+      search->refit();
+      const std::vector<Fate> all = fates(false);
+      if (std::find(all.begin(), all.end(), Fate::unfit) != all.end()) {
+        search->fit().set_modes(best);
+      }
+    }
+    const std::vector<DampedMode> likely = search->fit().modes();
+    const double most_rest = much_more * search->fit().rest_energy();
+    search->remove(are(fates(must_be_known), Fate::unfit));
+    if (must_be_known && search->fit().rest_energy() > most_rest) {
+      must_be_known = false;
+      search->fit().set_modes(likely);
+      search->remove(are(fates(must_be_known), Fate::unfit));
+    }
+  };
+  const Search whole = *search;
+  reduce(true);
+  if (options.least_modes > 0) {
+    // A number of modes that noise could explain, too, is a choice: the better one is made.
+    const Search grouped = *search;
+    search.emplace(whole);
+    reduce(false);
+    if (grouped.rest_energy() < search->fit().rest_energy()) {
+      search.emplace(grouped);
     }
   }
-  search->remove(are(fates(options.least_modes == 0), Fate::unfit));
   std::vector<Found> kept;
   double steady_hz = 0.0;
   double steady_energy = 0.0;
   std::size_t steady = 0;
-  const std::vector<Fate> fate = fates(options.least_modes == 0);
+  const std::vector<Fate> fate = fates(must_be_known);
   std::vector<Found> all = all_found(*search);
   for (std::size_t k = 0; k < all.size(); ++k) {
     extrapolate_back(all[k], skipped);
@@ -846,7 +883,7 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
              energy_of(kept[0].mode, frames) * std::pow(10.0, options.floor_db / 10.0)) {
     ++count;
   }
-  kept.resize(count);
+  kept.resize(std::min(count, options.most_modes));
   if (steady > 0) {
     made.warnings.push_back(
         (steady == 1 ? "a tone" : std::to_string(steady) + " tones") +
