@@ -538,7 +538,7 @@ TEST_CASE("scenes that once gained energy or fell silent stay fixed", "[scenes]"
   // Seeds below 40,000 that once failed: a force of 1e5 on a cubic spring of K/M = 1e6; a pluck of
   // 1e6 with a mass that comes to rest at its edge; 181 bows on one mass.
   for (const std::uint64_t seed :
-       {269, 14880, 17910, 21096, 24147, 28608, 40866, 41933, 45108, 56846, 58139}) {
+       {269u, 14880u, 17910u, 21096u, 24147u, 28608u, 40866u, 41933u, 45108u, 56846u, 58139u}) {
     CAPTURE(seed);
     const Outcome outcome = play(random_scene(seed), Passivity::always, 512);
     CHECK(outcome.is_finite);

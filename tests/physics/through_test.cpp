@@ -118,7 +118,7 @@ TEST_CASE("64 voices in one body are the body driven by the sum of 64 voices", "
                      [](const Event& a, const Event& b) { return a.frame < b.frame; });
     preset.gain = 3.0;
     const auto expected = alone(box, {sum}, rate_hz);
-    for (const std::size_t block : {256, 33}) {
+    for (const std::size_t block : {256u, 33u}) {
       Player whole(compiled(strings, through(preset, {box}), {.rate_hz = rate_hz}));
       whole.run(frames, all, {block});
       REQUIRE(whole.out.size() == 2);

@@ -243,16 +243,16 @@ struct Hybrid {
       mass[row] = random.uniform(0.5, 4.0);
       head += "@m" + std::to_string(m) + " mass " + digits(mass[row]) + " 0. 0.\n";
     }
-    for (std::size_t j = 0; j < modes; ++j) {
+    for (Eigen::Index j = 0; j < shape.cols(); ++j) {
       const double hz = random.uniform(30.0, 18000.0);
       const double t60_s = std::pow(10.0, random.uniform(-3.0, 1.0));
       head += "@b" + std::to_string(j) + " mode @b " + digits(hz) + " " + digits(t60_s);
-      for (std::size_t p = 0; p < places; ++p) {
+      for (Eigen::Index p = 0; p < shape.rows(); ++p) {
         shape(p, j) = random.uniform(-1.0, 1.0);
         head += " " + digits(shape(p, j));
       }
       head += "\n";
-      const auto row = static_cast<Eigen::Index>(masses + j);
+      const auto row = static_cast<Eigen::Index>(masses) + j;
       const double r = std::pow(10.0, -3.0 / (44100.0 * t60_s));
       mass[row] = body_mass;
       own_z[row] = body_mass * (1.0 - r * r);

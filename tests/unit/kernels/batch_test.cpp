@@ -307,7 +307,7 @@ TEST_CASE("hard contacts are passive in every voice", "[batch]") {
     REQUIRE(form);
     program.form = std::move(*form);
     for (const Isa isa : isas()) {
-      for (const std::size_t voices : {1, 13}) {
+      for (const std::size_t voices : {1u, 13u}) {
         CAPTURE(masses, isa_name(isa), voices);
         const VoiceTestOptions options{
             .voices = voices, .frames = 300, .reach = 0.03, .turns = true, .isa = isa};
@@ -328,7 +328,7 @@ TEST_CASE("a passive pick that comes and goes acts on masses in registers", "[ba
   REQUIRE((form && !is_plain(program)));
   program.form = std::move(*form);
   for (const Isa isa : isas()) {
-    for (const std::size_t voices : {1, 5, 13}) {
+    for (const std::size_t voices : {1u, 5u, 13u}) {
       CAPTURE(isa_name(isa), voices);
       for (const Comparison& voice : compare_voices<double>(
                program, {.voices = voices, .frames = 6000, .reach = 0.06, .isa = isa})) {

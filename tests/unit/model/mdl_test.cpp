@@ -432,7 +432,7 @@ TEST_CASE("messages show valid UTF-8 unchanged, and '?' otherwise", "[mdl]") {
 }
 
 TEST_CASE("labels of any length survive copying the network", "[mdl]") {
-  for (const std::size_t length : {1, 14, 15, 16, 17, 127, 300}) {
+  for (const std::size_t length : {1u, 14u, 15u, 16u, 17u, 127u, 300u}) {
     const std::string label(length, 'm');
     const std::string text = "@" + label + " mass 1. 0. 0.\n@g ground 0.\n@" + label +
                              "s spring @" + label + " @g 0.1\n@out1 posOutput @" + label + "\n";

@@ -166,7 +166,7 @@ TEST_CASE("Hundreds of swaps while notes sound cause no clicks, leaks or crashes
   for (int n = 0; n < support::of_all(250, 1000); ++n) {
     REQUIRE(session.load_and_wait(n % 2 == 0 ? hard : soft));
     // some loads wait for the end of the fade, some come during it
-    wait_for_blocks(player, n % 50);
+    wait_for_blocks(player, static_cast<std::uint64_t>(n % 50));
   }
   // The worker has to collect the last engine before memory is counted.
   std::size_t after = support::heap_bytes();
