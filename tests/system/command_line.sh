@@ -114,6 +114,8 @@ expect 0 "same modes" sh -c "cmp expected.mdl written.mdl && echo same modes"
 expect 0 ", the centroid of the spectrum" "$program" describe blow.flac -o timbre.svg
 expect 2 "timbre.svg' exists already" "$program" describe blow.flac -o timbre.svg
 expect 2 "ends in .svg" "$program" describe blow.flac -o timbre.png
+expect 0 "--note, --seconds, --rate and --motion have no effect on a sound file" \
+  "$program" describe blow.flac --note 60
 expect 2 "there is no file 'nosuch.wav'" "$program" describe nosuch.wav
 expect 2 "there is no model or preset 'nosuch'" "$program" describe nosuch
 expect 2 "is not a readable sound file" "$program" describe text.wav
@@ -514,6 +516,10 @@ printf 'quit\n' > quit.script
 expect 0 "$silent" "$program" play mute.mdl -a dummy -u off -m none -e quit.script
 expect 0 "would let keys strike it" "$program" play mute.mdl -a dummy -u off -m none -e quit.script
 expect 0 "--paused has no effect" "$program" play -a dummy -u off -m none -e quit.script --paused
+expect 0 "--connect has no effect without JACK" \
+  "$program" play -a dummy -u off -m none -e quit.script --connect
+expect 0 "--device has no effect without ALSA" \
+  "$program" play -a dummy -u off -m none -e quit.script -d hw:1
 expect 0 "--osc-reply and --osc-allow have no effect with -u off" \
   "$program" play -a dummy -u off -m none -e quit.script --osc-reply 9000
 expect 0 "wide.toml:3:5: warning: 'K' is kept below 3.99999; above it the model is not stable" \

@@ -161,6 +161,12 @@ class Player {
       return refuse(loaded.error().message);
     }
     greet(**loaded);
+    if (options_.device.connect && device_kind_ != "jack") {
+      voice_.say("--connect has no effect without JACK");
+    }
+    if (options_.device.device != AudioOptions{}.device && device_kind_ != "alsa") {
+      voice_.say("--device has no effect without ALSA");
+    }
     open_osc();
     open_panel();
     open_midi();

@@ -186,6 +186,11 @@ int describe(const DescribeOptions& options, const std::function<bool()>& should
       return reject(spared.error().message);
     }
   }
+  const DescribeOptions usual;
+  if (names_sound(options.name) && (options.key != usual.key || options.seconds != usual.seconds ||
+                                    options.rate_hz != usual.rate_hz || options.third)) {
+    print_error("--note, --seconds, --rate and --motion have no effect on a sound file");
+  }
   if (!options.swept.empty()) {
     return sweep(options, should_continue);
   }
