@@ -112,18 +112,35 @@ std::string place_of(std::size_t places, std::size_t number) {
   return five_digits(static_cast<double>(number) / static_cast<double>(places - 1));
 }
 
-// One blow of the hand: the same in both directions in turn, so that chords add no offset.
+// One blow of the hand: the same in both directions in turn, so that chords add no offset. Its
+// force is the same on all keys, because the velocities that are heard would grow with the pitch.
 std::string strike(double direction, int turn) {
   const std::string one = direction < 0.0 ? "-1.0" : "1.0";
   return "\n[[control]]\nfrom = \"note\"\nto = \"in1\"\nhow = \"impulse\"\nrange = [" + one + ", " +
          one + "]\nlevel_db = [-24.0, 0.0]\nround_robin = [" + std::to_string(turn) +
-         ", 2]\nlength_ms = [4.0, 0.05]\n";
+         ", 2]\nlength_ms = [4.0, 0.05]\nfollows_pitch = false\n";
 }
 
 std::string knob(const std::string& from, const std::string& to, const std::string& name,
                  const std::string& range) {
   return "\n[[control]]\nfrom = \"" + from + "\"\nto = \"" + to + "\"\nname = \"" + name +
          "\"\nrange = " + range + "\n";
+}
+
+// Returns the frequency of the mode with the most energy.
+double loudest_hz(const Identification& found) {
+  const auto energy = [](const IdentifiedMode& mode) {
+    double square = 0.0;
+    for (const Measured& amplitude : mode.amplitude) {
+      square += amplitude.value * amplitude.value;
+    }
+    return square * mode.t60_s.value;
+  };
+  return std::max_element(found.modes.begin(), found.modes.end(),
+                          [&](const IdentifiedMode& a, const IdentifiedMode& b) {
+                            return energy(a) < energy(b);
+                          })
+      ->frequency_hz.value;
 }
 
 // Returns the modes as they are when their sum is smallest, in the first millisecond, so that they
@@ -242,11 +259,16 @@ std::string played_preset(const Identification& found, const std::vector<NoiseBa
     }
   }
   const std::size_t places = 3 + 2 * found.sound.size() + noise.size();
+  const double cents =
+      1200.0 * std::log2(loudest_hz(found) / found.modes.front().frequency_hz.value);
+  const double semitones = std::round(cents / 100.0);
   const std::string range = "[0, " + place_of(places, 2) + "]";
   std::string text =
       "model = \"" + model + "\"\ndescription = \"" + source + ": " +
       counted(found.modes.size(), "mode", "modes") +
-      ". The wheel moves the blow.\"\nvoices = 8\ngain = " + five_digits(wanted_peak / peak) +
+      ". The wheel moves the blow.\"\nvoices = 8\ntranspose = " + five_digits(0.0 - semitones) +
+      "\nflattening_cents = " + five_digits(100.0 * semitones - cents) +
+      "\ngain = " + five_digits(wanted_peak / peak) +
       "\nhardness = \"mallet\"\n\n[parameters]\nmallet = { value = 0, range = [-0.5, 0.5] }\nring "
       "= { value = 1, range = [0.5, 2] }\n"
       "damp = { value = 0, range = [0, 20] }\nplace = { value = " +

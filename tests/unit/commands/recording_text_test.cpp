@@ -2,13 +2,17 @@
 #include "app/commands/body/recording.h"
 
 #include <cmath>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "app/commands/output.h"
+#include "app/session/compile_scene.h"
+#include "app/session/loader.h"
 #include "core/identification/shapes.h"
 #include "core/identification/spectrum.h"
 #include "tests/support/harness.h"
+#include "tests/support/player.h"
 #include "tests/support/ringing.h"
 
 namespace ressort::recording_text_test {
@@ -123,6 +127,46 @@ TEST_CASE("The preset names its model, its knobs and a burst for each band", "[r
     CHECK(text.find(knob) != std::string::npos);
   }
   CHECK(text.find("length_ms = [100, 100]") != std::string::npos);
+}
+
+TEST_CASE("A played recording has its loudest mode at the key, and no key is louder",
+          "[recording_text]") {
+  // All modes start with phase 0 or pi, so velocities are heard, which grow with the pitch at equal
+  // motion. The loudest mode is at A3, key 57, one octave and 10 cents above the lowest one.
+  const double low_hz = 110.0 * std::exp2(-10.0 / 1200.0);
+  const Identification found = identified({ringing({{low_hz, 0.5, 0.1, std::numbers::pi},
+                                                    {220.0, 0.5, 0.5, 0.0},
+                                                    {330.0, 0.4, 0.4, std::numbers::pi}},
+                                                   1.0)});
+  const std::string text = played_preset(found, {}, "bowl.mdl", "bowl.wav");
+  INFO(text);
+  const auto folder = TemporaryFolder::make();
+  REQUIRE(folder);
+  std::ofstream(folder->file("bowl.mdl")) << played_model(found, {}, "bowl", "bowl.wav", 40.0);
+  std::ofstream(folder->file("bowl.toml")) << text;
+  const auto scene = load_scene(folder->file("bowl.toml"), {});
+  REQUIRE(scene);
+  const auto played = [&](int key) {
+    std::vector<std::string> warnings;
+    auto compiled = compile_scene(*scene, {.rate_hz = 44100.0}, warnings);
+    REQUIRE(compiled);
+    Player player(*std::move(compiled));
+    player.run(44100, {note_on(0, key)});
+    return player.y();
+  };
+  const auto peak_at = [&](int key) { return peak(played(key)); };
+  const double own = peak_at(57);
+  CHECK(own > 0.1);
+  // Velocities alone have at most the sum of the amplitudes, 1.0 beside a peak of 0.8 or more.
+  for (const int key : {69, 81, 93}) {
+    INFO("key " << key);
+    CHECK(peak_at(key) < 1.3 * own);
+  }
+  const std::vector<double> y = played(57);
+  const Power power(std::vector<std::vector<double>>{y}, y.size());
+  // A mode with a T60 of 0.5 s has 2 / pi atan(2), 70 %, of its energy within 4.4 Hz.
+  const double omega = 2.0 * std::numbers::pi * 220.0 / 44100.0;
+  CHECK(power.between(0.98 * omega, 1.02 * omega) > 0.5 * power.between(0.0, 1.2 * omega));
 }
 
 TEST_CASE("Numbers are written with their significant digits", "[recording_text]") {
