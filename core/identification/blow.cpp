@@ -83,7 +83,7 @@ std::size_t find_loudest_blow(const std::vector<double>& loudness, std::size_t f
                           levels.begin() + static_cast<std::ptrdiff_t>(k + rise_hops + 1));
     if (has_died_away && after > attack * levels[k] && after > died_away * loudness[peak]) {
       found = first + (k + 1) * hop;
-      while (loudness[found] < 2.0 * levels[k]) {
+      while (loudness[found] < std::max(2.0 * levels[k], audible * loudness[peak])) {
         ++found;
       }
     }

@@ -258,6 +258,14 @@ TEST_CASE("The loudest of several blows is used, with a warning", "[identify]") 
     CHECK(found.warnings[0] ==
           "it has several blows; the loudest one is used, which begins at 0.1 s");
   }
+  SECTION("digital silence precedes the second") {
+    std::vector<double> sound = twice(2.0);
+    std::fill(sound.begin() + second - 2205, sound.begin() + second, 0.0);
+    for (std::size_t n = 0; n < blow.size(); ++n) {
+      sound[n + second] = 2.0 * blow[n];
+    }
+    CHECK(std::fabs(identified({sound}).onset_s - 0.1) < 1.5 / 44100.0);
+  }
   SECTION("the first is louder") {
     CHECK(identified({twice(0.3)}).onset_s == 0.0);
   }
