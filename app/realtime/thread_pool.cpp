@@ -40,7 +40,13 @@ void pause() {
 class ThreadPool::Team final : public Crew {
  public:
   Team(ThreadPool& pool, std::vector<Task*> tasks)
-      : pool_(pool), tasks_(std::move(tasks)), claims_(tasks_.size()), is_offered_(tasks_.size()) {}
+      : pool_(pool),
+        tasks_(std::move(tasks)),
+        claims_(tasks_.size()),
+        is_open_(tasks_.size()),
+        is_performed_(tasks_.size()) {
+    offered_.reserve(tasks_.size());
+  }
 
   ~Team() override {
     while (pool_.shown_.is_used(this)) {
@@ -48,30 +54,42 @@ class ThreadPool::Team final : public Crew {
     }
   }
 
-  void run(std::span<const std::uint32_t> wanted) override {
-    if (wanted.size() < 2 || pool_.threads_.empty() || !pool_.shown_.show(this)) {
-      for (const std::uint32_t i : wanted) {
-        tasks_[i]->perform();
-      }
-      return;
+  void offer(std::uint32_t task) override {
+    if (offered_.empty()) {
+      is_shown_ = !pool_.threads_.empty() && pool_.shown_.show(this);
+      predict_period();
     }
-    const std::int64_t start_ns = pool_.is_live() ? begin() : 0;
-    for (const std::uint32_t i : wanted) {
-      is_offered_[i] = claims_[i].is_free();
-      if (is_offered_[i]) {
-        tasks_[i]->offer();
-        claims_[i].offer();
-      }
+    offered_.push_back(task);
+    is_performed_[task] = false;
+    is_open_[task] = is_shown_ && claims_[task].is_free();
+    if (is_open_[task]) {
+      tasks_[task]->offer();
+      claims_[task].offer();
     }
-    perform_own(wanted, start_ns);
-    pool_.shown_.hide();
-    finish(wanted);
   }
 
-  // Performs the tasks it can claim; false if there were none. [helper]
+  void finish(std::uint32_t task) override {
+    if (!is_performed_[task] && !perform_own(task)) {
+      await(task);
+    }
+    if (++finished_ < offered_.size()) {
+      return;
+    }
+    if (is_shown_) {
+      pool_.shown_.hide();
+    }
+    offered_.clear();
+    finished_ = 0;
+    last_free_ = 0;
+    patience_ends_ns_ = 0;
+    longest_before_ns_ = longest_ns_ > 0 ? longest_ns_ : longest_before_ns_;
+    longest_ns_ = 0;
+  }
+
+  // Performs the tasks that it can claim; false if there were none. [helper]
   bool help() {
     bool has_helped = false;
-    for (std::size_t i = tasks_.size(); i-- > 0;) {
+    for (std::size_t i = 0; i < tasks_.size(); ++i) {
       if (claims_[i].claim()) {
         pool_.is_live() ? tasks_[i]->perform_aside() : tasks_[i]->perform();
         claims_[i].finish();
@@ -82,68 +100,97 @@ class ThreadPool::Team final : public Crew {
   }
 
  private:
-  // The first run of a period predicts the start of the next one.
-  std::int64_t begin() {
-    const std::int64_t start_ns = now_ns();
+  // The first offer of a period predicts the start of the next one.
+  void predict_period() {
+    if (!pool_.is_live()) {
+      return;
+    }
     const ClockReading reading = pool_.clock_->read();
     if (reading.frame != pool_.frame_ && reading.rate_hz > 0.0) {
       pool_.frame_ = reading.frame;
       const auto period_ns =
           static_cast<std::int64_t>(1e9 * static_cast<double>(reading.period) / reading.rate_hz);
       pool_.period_ns_.set(period_ns);
-      pool_.next_ns_.set(start_ns + period_ns);
+      pool_.next_ns_.set(now_ns() + period_ns);
     }
-    return start_ns;
   }
 
-  // Performs tasks from the front; helpers start from the back.
-  void perform_own(std::span<const std::uint32_t> wanted, std::int64_t start_ns) {
-    std::int64_t longest_ns = 0;
-    for (const std::uint32_t i : wanted) {
-      if (is_offered_[i]) {
-        if (!claims_[i].take_back()) {
-          continue;
-        }
-        is_offered_[i] = false;
+  // Performs a task that no helper has claimed; false if one has.
+  bool perform_own(std::uint32_t task) {
+    if (is_open_[task] && !claims_[task].take_back()) {
+      return false;
+    }
+    is_open_[task] = false;
+    is_performed_[task] = true;
+    measure([&] { tasks_[task]->perform(); });
+    return true;
+  }
+
+  // Performs another task, the last one that no helper has claimed; false if there is none. Helpers
+  // begin with the first ones.
+  bool perform_another() {
+    last_free_ = last_free_ > 0 ? last_free_ : offered_.size();
+    while (last_free_ > finished_ + 1) {
+      const std::uint32_t task = offered_[--last_free_];
+      if (!is_performed_[task] && perform_own(task)) {
+        return true;
       }
-      tasks_[i]->perform();
+    }
+    return false;
+  }
+
+  // Waits for the helper that performs a task, and meanwhile performs others. A helper that started
+  // in time needs no longer than the longest task of this thread, so all of them together get twice
+  // that time. Tasks still unfinished then are taken over.
+  void await(std::uint32_t task) {
+    while (!claims_[task].is_done()) {
+      if (perform_another()) {
+        continue;
+      }
       if (pool_.is_live()) {
-        const std::int64_t end_ns = now_ns();
-        longest_ns = std::max(longest_ns, end_ns - start_ns);
-        start_ns = end_ns;
+        const std::int64_t time_ns = now_ns();
+        patience_ends_ns_ = patience_ends_ns_ > 0
+                                ? patience_ends_ns_
+                                : time_ns + 2 * std::max(longest_ns_, longest_before_ns_);
+        if (time_ns > patience_ends_ns_) {
+          break;
+        }
       }
+      pause();
     }
-    longest_ns_ = longest_ns > 0 ? longest_ns : longest_ns_;
+    if (!pool_.is_live()) {
+      return;
+    }
+    if (claims_[task].leave()) {
+      measure([&] { tasks_[task]->take_over(); });
+    } else {
+      tasks_[task]->accept();
+    }
   }
 
-  // Waits for the helpers. A helper that started in time needs no longer than the longest task of
-  // this thread, so all of them together get twice that time. Tasks still unfinished then are taken
-  // over.
-  void finish(std::span<const std::uint32_t> wanted) {
-    const std::int64_t patience_ns = pool_.is_live() ? now_ns() + 2 * longest_ns_ : 0;
-    for (const std::uint32_t i : wanted) {
-      if (!is_offered_[i]) {
-        continue;
-      }
-      while (!claims_[i].is_done() && !(pool_.is_live() && now_ns() > patience_ns)) {
-        pause();
-      }
-      if (!pool_.is_live()) {
-        continue;
-      }
-      if (claims_[i].leave()) {
-        tasks_[i]->take_over();
-      } else {
-        tasks_[i]->accept();
-      }
+  // Works, and keeps the longest time that a task has taken in this round or the last.
+  template <class Work>
+  void measure(Work&& work) {
+    if (!pool_.is_live()) {
+      return work();
     }
+    const std::int64_t start_ns = now_ns();
+    work();
+    longest_ns_ = std::max(longest_ns_, now_ns() - start_ns);
   }
 
   ThreadPool& pool_;
   const std::vector<Task*> tasks_;
-  std::vector<Claim> claims_;     // [task]
-  std::vector<bool> is_offered_;  // [task] in this run, and not taken back
-  std::int64_t longest_ns_ = 0;   // longest own task of the last run
+  std::vector<Claim> claims_;           // [task]
+  std::vector<bool> is_open_;           // [task] helpers may have claimed it in this round
+  std::vector<bool> is_performed_;      // [task] by this thread in this round
+  std::vector<std::uint32_t> offered_;  // tasks of this round
+  std::size_t finished_ = 0;            // tasks of this round
+  std::size_t last_free_ = 0;           // tasks in `offered_` that may be free; 0: all
+  bool is_shown_ = false;               // helpers see this team
+  std::int64_t longest_ns_ = 0;         // longest task of this thread in this round
+  std::int64_t longest_before_ns_ = 0;  // the same in an earlier round
+  std::int64_t patience_ends_ns_ = 0;   // 0: this thread has not waited in this round
 };
 
 ThreadPool::ThreadPool(std::size_t count, const SeqLock<ClockReading>* live)

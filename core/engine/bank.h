@@ -262,13 +262,16 @@ struct Bank {
         task.lanes = group.end - group.first;
         task.is_still = held->filled_part == &part;
         shared.wanted.push_back(i);
+        shared.crew->offer(i);
       }
     });
-    shared.crew->run(shared.wanted);
     auto next = shared.wanted.begin();
     each_task([&](std::uint32_t i, PartBank<T>& part, const VoiceGroup& group) {
       const bool has_stepped = next != shared.wanted.end() && *next == i;
-      next += has_stepped ? 1 : 0;
+      if (has_stepped) {
+        ++next;
+        shared.crew->finish(i);
+      }
       mix(part, group, has_stepped);
     });
   }

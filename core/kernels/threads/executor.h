@@ -9,14 +9,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <span>
 #include <vector>
 
 #include "core/rooms.h"
 
 namespace ressort::kernels {
 
-// A unit of work. The caller is the thread that calls Crew::run().
+// A unit of work. The caller is the thread that calls Crew::offer().
 class Task {
  public:
   virtual ~Task() = default;
@@ -27,15 +26,18 @@ class Task {
   virtual void take_over() = 0;      // Works on a third copy while a helper is late [caller].
 };
 
-// A set of tasks that run at the same time, repeatedly.
+// A set of tasks that run at the same time, repeatedly. The caller offers some of them, and then
+// finishes them in the same order. It can work on the results of the first ones
+// while helpers perform the others. [audio] both functions are wait-free if Executor::is_live():
+// all finishes together wait for at most twice the longest task plus the copies.
 class Crew {
  public:
   // Returns when no helper is in any of the tasks. [any thread but audio]
   virtual ~Crew() = default;
-  // Performs the tasks in `wanted` once each and returns when all are done. [audio] wait-free if
-  // Executor::is_live(). Compared with one thread it takes at most twice the longest task plus the
-  // copies longer.
-  virtual void run(std::span<const std::uint32_t> wanted) = 0;
+  // Allows helpers to perform a task, once. Its input is complete.
+  virtual void offer(std::uint32_t task) = 0;
+  // Returns when an offered task is done. Performs it if no helper does.
+  virtual void finish(std::uint32_t task) = 0;
 };
 
 // A pool of helper threads.

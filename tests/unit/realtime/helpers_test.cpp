@@ -166,8 +166,10 @@ struct Gated final : Task {
 struct GatedCrew {
   GatedCrew() { second.is_shut = true; }
   void run() {
-    static constexpr std::uint32_t both[] = {0, 1};
-    crew->run(both);
+    crew->offer(0);
+    crew->offer(1);
+    crew->finish(0);
+    crew->finish(1);
     ++runs;
   }
   // Waits until the helper is at the gate.
@@ -215,6 +217,25 @@ TEST_CASE("a helper that is stopped during a task is not waited for", "[helpers]
     gated.run();
   }
   CHECK(second.offered > again);
+}
+
+TEST_CASE("a helper begins with the first task while others are prepared", "[helpers]") {
+  GatedCrew gated;
+  gated.clock.write({0, 0, 48000.0, 64});
+  gated.first.is_shut = true;
+  gated.second.is_shut = false;
+  gated.crew->offer(0);
+  while (gated.first.inside == 0) {
+    std::this_thread::yield();
+  }
+  CHECK(gated.second.offered == 0);
+  gated.first.is_shut = false;
+  gated.crew->offer(1);
+  gated.crew->finish(0);
+  gated.crew->finish(1);
+  CHECK(gated.first.performed == 0);
+  CHECK(gated.first.accepted + gated.first.taken == 1);
+  CHECK(gated.second.performed + gated.second.accepted + gated.second.taken == 1);
 }
 
 TEST_CASE("a crew is not destroyed while a helper uses it", "[helpers]") {
