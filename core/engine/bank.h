@@ -25,6 +25,8 @@ struct PartBank {
       kernels.push_back(make_kernel<T>(program, voices, isa));
       width = kernels[0]->width();
     } while (kernels.size() * width < voices);
+    untuned.resize(kernels.size() * width * program.coefficients.size());
+    is_known.resize(kernels.size() * width);
     last.resize(kernels.size() * row());
     before.resize(last.size());
     slope.resize(last.size());
@@ -42,6 +44,18 @@ struct PartBank {
       slope[at] = static_cast<T>(program.velocity[node] / program.rate_ratio);
     }
   }
+  // Returns the value of a coefficient in a voice. If `is_unturned`, the parameters have not
+  // changed since the last call. [audio]
+  double value(std::size_t voice, std::uint32_t c, std::span<const double> parameters,
+               double stiffness_factor, bool is_unturned) {
+    const Coefficient& coefficient = program.coefficients[c];
+    if (coefficient.mode != no_mode && !program.form.is_continuous()) {
+      return sampled_value(program, coefficient, parameters, stiffness_factor);
+    }
+    double& value = untuned[voice * program.coefficients.size() + c];
+    value = is_unturned ? value : untuned_value(program, coefficient, parameters);
+    return tuned_value(program, coefficient, value, stiffness_factor);
+  }
   T* last_of(std::size_t voice) { return last.data() + voice / width * row(); }
   // size of an output row of one kernel
   std::size_t row() const { return program.outputs.size() * width; }
@@ -51,7 +65,9 @@ struct PartBank {
   const Program& program;
   std::size_t width = 1;
   std::vector<std::unique_ptr<Kernel<T>>> kernels;  // [voice / width]
-  Aligned<T> last;                                  // [kernel][output][lane] last sample
+  std::vector<double> untuned;  // [voice][coefficient] before the stiffness factor (untuned_value)
+  std::vector<bool> is_known;   // [voice] `untuned` is up to date
+  Aligned<T> last;              // [kernel][output][lane] last sample
   // The position and the velocity in the last sample, for outputs of derivatives.
   Aligned<T> before;  // [kernel][output][lane]
   Aligned<T> slope;   // [kernel][output][lane]

@@ -478,6 +478,7 @@ struct Engine::Player {
     }
     voices.advance_glides();
     lfos.advance(keyboard);
+    parameters.advance();
     watch.inspect_next(b, voices, parameters.values());
     for (std::size_t lane = 0; lane < voices.size(); ++lane) {
       Voice& voice = voices[lane];

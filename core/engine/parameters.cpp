@@ -12,23 +12,34 @@ constexpr std::size_t tuning_frames = 128;
 // Ramp of a changed parameter. It joins the steps of a controller, which are about 10 ms apart.
 constexpr double turn_s = 0.02;
 
+bool retunes_voices(const Control& control) {
+  return control.source == Source::lfo && control.target != Control::level;
+}
+
 }  // namespace
 
 Parameters::Parameters(const Machine& machine, const Playing& playing, std::size_t lanes)
     : playing_(playing),
       turn_frames_(static_cast<std::size_t>(std::lround(turn_s * machine.rate_hz))),
+      glides_(!playing.bare &&
+              std::any_of(playing.controls.begin(), playing.controls.end(), retunes_voices)),
       values_(machine.parameters),
+      played_(values_),
       is_turned_(values_.size()) {
   for (std::size_t lane = 0; !playing.curves.empty() && lane < lanes; ++lane) {
     voice_values_.insert(voice_values_.end(), values_.begin(), values_.end());
   }
   turned_.reserve(values_.size());
+  swung_.reserve(values_.size());
+  gliding_.reserve(values_.size());
   changes_.reserve(max_parameter_changes);
   taken_.reserve(max_parameter_changes);
 }
 
 void Parameters::continue_from(const Parameters& from) {
   values_ = from.values_;
+  played_ = from.played_;
+  gliding_.assign(from.gliding_.begin(), from.gliding_.end());
   if (voice_values_.size() == from.voice_values_.size()) {
     voice_values_ = from.voice_values_;
   }
@@ -72,18 +83,22 @@ void Parameters::set(std::size_t index, double wanted) {
   if (values_[index] == value) {
     return;
   }
-  if (!has_changed()) {
-    highest_before_ = highest_factor();
-  }
   const auto parameter = static_cast<std::uint16_t>(index);
-  if (!is_turned_[index]) {
-    is_turned_[index] = true;
-    turned_.push_back(parameter);
-  }
+  note_turn(parameter);
   values_[index] = value;
   if (changes_.size() < max_parameter_changes &&
       std::find(changes_.begin(), changes_.end(), parameter) == changes_.end()) {
     changes_.push_back(parameter);
+  }
+}
+
+void Parameters::note_turn(std::uint16_t parameter) {
+  if (!has_changed()) {
+    highest_before_ = highest_factor();
+  }
+  if (!is_turned_[parameter]) {
+    is_turned_[parameter] = true;
+    turned_.push_back(parameter);
   }
 }
 
@@ -93,22 +108,73 @@ std::span<const std::uint16_t> Parameters::take_changes() {
   return taken_;
 }
 
+// Kernels ramp all coefficients alike. Where LFOs retune voices in every block, such a ramp is
+// shorter than that of a knob, so that the parameter itself has to glide.
+void Parameters::start_glides(bool is_any_audible) {
+  if (!is_any_audible) {
+    for (const Glide& glide : gliding_) {
+      note_turn(glide.parameter);
+    }
+    gliding_.clear();
+    played_ = values_;
+    return;
+  }
+  for (const std::uint16_t parameter : turned_) {
+    const double target = values_[parameter];
+    auto glide = std::find_if(gliding_.begin(), gliding_.end(),
+                              [&](const Glide& g) { return g.parameter == parameter; });
+    if (!glides_) {
+      played_[parameter] = target;
+    } else if (glide == gliding_.end()) {
+      if (played_[parameter] != target) {
+        gliding_.push_back({parameter, target, turn_frames_});
+      }
+    } else if (glide->target != target) {
+      glide->target = target;
+      glide->frames = turn_frames_;
+    }
+  }
+}
+
+void Parameters::advance() {
+  for (Glide& glide : gliding_) {
+    double& value = played_[glide.parameter];
+    const std::size_t frames = std::min(max_block_frames, glide.frames);
+    value = frames < glide.frames ? value + (glide.target - value) * static_cast<double>(frames) /
+                                                static_cast<double>(glide.frames)
+                                  : glide.target;
+    glide.frames -= frames;
+    note_turn(glide.parameter);
+  }
+  std::erase_if(gliding_, [](const Glide& glide) { return glide.frames == 0; });
+}
+
 void Parameters::update_voice_values(const Voices& voices) {
+  swung_.clear();
   for (std::size_t lane = 0; !voice_values_.empty() && lane < voices.size(); ++lane) {
     const Voice& voice = voices[lane];
     const bool may_differ = has_changed() || voice.is_new || voice.is_retuned;
     const std::span<const double> swings = voices.swings_in(lane);
     for (std::size_t i = 0; voice.awake && may_differ && i < values_.size(); ++i) {
       const VoiceCurve* const curve = playing_.curve_of(i);
-      const double value = value_in_voice(playing_, i, values_[i], voice);
-      const bool is_swung = voice.has_key && curve != nullptr && !swings.empty();
-      voice_values_[lane * values_.size() + i] = is_swung ? curve->moved(value, swings[i]) : value;
+      double value = value_in_voice(playing_, i, played_[i], voice);
+      if (voice.has_key && curve != nullptr && !swings.empty()) {
+        value = curve->moved(value, swings[i]);
+      }
+      double& before = voice_values_[lane * values_.size() + i];
+      const auto parameter = static_cast<std::uint16_t>(i);
+      if (before != value && !voice.is_new && !is_turned_[i] &&
+          std::find(swung_.begin(), swung_.end(), parameter) == swung_.end()) {
+        swung_.push_back(parameter);
+      }
+      before = value;
     }
   }
 }
 
 template <class T>
 void Parameters::apply(Bank<T>& bank, const Voices& voices, EnergyWatch& watch) {
+  start_glides(voices.is_any_audible());
   update_voice_values(voices);
   const double highest = highest_factor();
   bank.each_group([&](PartBank<T>& part, const VoiceGroup& group) {
@@ -124,11 +190,11 @@ void Parameters::apply(Bank<T>& bank, const Voices& voices, EnergyWatch& watch) 
       if (!voice.awake || !(has_turned || is_tuned)) {
         continue;
       }
-      const bool is_known = voice.sounding_hz > 0.0 && !playing_.warp.factors.empty();
+      const bool has_warp = voice.sounding_hz > 0.0 && !playing_.warp.factors.empty();
       kernel.tune(
           lane - group.first,
           {.warp =
-               is_known ? playing_.warp.factor_at(playing_.warp.inside(voice.sounding_hz)) : 0.0,
+               has_warp ? playing_.warp.factor_at(playing_.warp.inside(voice.sounding_hz)) : 0.0,
            .share = voice.factor / highest,
            .is_new = voice.is_new});
       if (voice.is_new) {
@@ -138,19 +204,26 @@ void Parameters::apply(Bank<T>& bank, const Voices& voices, EnergyWatch& watch) 
       }
       watch.mark_driven(voice, lane, group.part);
       const bool ramped = !voice.is_new && !playing_.bare;
-      const auto set = [&](std::uint32_t c) {
-        const double value = coefficient_value(part.program, part.program.coefficients[c],
-                                               values_in(lane), voice.factor);
-        kernel.coefficients.set(lane - group.first, c, value, ramped);
+      const auto set = [&](std::uint32_t c, bool is_known) {
+        kernel.coefficients.set(lane - group.first, c,
+                                part.value(lane, c, values_in(lane), voice.factor, is_known),
+                                ramped);
       };
+      const auto set_depending = [&](std::uint16_t parameter) {
+        std::for_each(depending[parameter].begin(), depending[parameter].end(),
+                      [&](std::uint32_t c) { set(c, false); });
+      };
+      const bool is_known = part.is_known[lane] && !voice.is_new;
       for (std::uint32_t c = 0; is_tuned && c < part.program.coefficients.size(); ++c) {
-        set(c);
+        set(c, is_known);
       }
-      for (std::size_t i = 0; !is_tuned && i < turned_.size(); ++i) {
-        std::for_each(depending[turned_[i]].begin(), depending[turned_[i]].end(), set);
+      part.is_known[lane] = (is_known || is_tuned) && part.program.audio_coefficients.empty();
+      if (is_known || !is_tuned) {
+        std::for_each(turned_.begin(), turned_.end(), set_depending);
+        std::for_each(swung_.begin(), swung_.end(), set_depending);
       }
       if (ramped && (frames == 0 || is_tuned)) {
-        frames = is_tuned ? tuning_frames : turn_frames_;
+        frames = is_tuned || !gliding_.empty() ? tuning_frames : turn_frames_;
       }
     }
     if (frames > 0) {
@@ -179,6 +252,7 @@ void Parameters::fill_audio(Bank<T>& bank, const VoiceGroup& group, const Segmen
       const bool is_there = channel < segment.inputs.size() && segment.inputs[channel] != nullptr;
       const double wanted = is_there ? segment.inputs[channel][n] : 0.0;
       values_[audio.parameter] = within_limits(audio.parameter, wanted);
+      played_[audio.parameter] = values_[audio.parameter];
       is_beyond |= values_[audio.parameter] != wanted;
       for (std::size_t lane = group.first; !voice_values_.empty() && lane < group.end; ++lane) {
         voice_values_[lane * values_.size() + audio.parameter] = values_[audio.parameter];

@@ -34,6 +34,8 @@ class Parameters {
   // coefficients that depend on changed parameters and retuned voices.
   template <class T>
   void apply(Bank<T>& bank, const Voices& voices, EnergyWatch& watch);
+  // Advances the parameters that glide by one block. Their changes wait for the next apply().
+  void advance();
   // Computes the coefficients that depend on audio parameters, for every sample.
   template <class T>
   void fill_audio(Bank<T>& bank, const VoiceGroup& group, const Segment& segment,
@@ -45,20 +47,33 @@ class Parameters {
 
  private:
   double within_limits(std::size_t index, double value) const;
-  // Returns the values in one voice. They differ from values() if the preset has curves.
+  // A parameter on its way to its value.
+  struct Glide {
+    std::uint16_t parameter = 0;
+    double target = 0.0;
+    std::size_t frames = 0;  // left
+  };
+
+  // Returns the values in one voice. They differ from the shared ones if the preset has curves.
   std::span<const double> values_in(std::size_t lane) const {
     return voice_values_.empty()
-               ? std::span(values_)
+               ? std::span(played_)
                : std::span(voice_values_).subspan(lane * values_.size(), values_.size());
   }
+  void note_turn(std::uint16_t parameter);
+  void start_glides(bool is_any_audible);
   void update_voice_values(const Voices& voices);
 
   const Playing& playing_;
   std::size_t turn_frames_;  // ramp of a changed parameter
+  bool glides_;              // LFOs retune voices in every block
   std::vector<double> values_;
-  std::vector<double> voice_values_;    // [lane][parameter]; empty: all voices have values_
+  std::vector<double> played_;  // values_, or on the way to them
+  std::vector<Glide> gliding_;
+  std::vector<double> voice_values_;    // [lane][parameter]; empty: all voices have played_
   std::vector<std::uint16_t> turned_;   // since the last apply()
   std::vector<bool> is_turned_;         // [parameter]
+  std::vector<std::uint16_t> swung_;    // by LFOs, in any voice, since the last apply()
   double highest_before_ = 1.0;         // highest_factor() before the first of these changes
   std::vector<std::uint16_t> changes_;  // since the last take_changes()
   std::vector<std::uint16_t> taken_;    // result of the last take_changes()

@@ -16,6 +16,10 @@ Coefficients<T>::Coefficients(const Program& program, std::size_t width_in)
 
 template <class T>
 void Coefficients<T>::set(std::size_t lane, std::uint32_t c, double wanted, bool ramped) {
+  const std::size_t at = c * width + lane;
+  if (ramped && target[at] == static_cast<T>(wanted)) {
+    return;
+  }
   if (ramped && !is_ramping[c]) {
     is_ramping[c] = true;
     ramping.push_back(c);
@@ -24,7 +28,6 @@ void Coefficients<T>::set(std::size_t lane, std::uint32_t c, double wanted, bool
     }
   }
   has_changed = true;
-  const std::size_t at = c * width + lane;
   target[at] = static_cast<T>(wanted);
   if (!ramped) {
     value[at] = target[at];

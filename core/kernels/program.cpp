@@ -55,32 +55,44 @@ double rate_factor(Unit unit, double r) {
   return 1.0;
 }
 
-double continuous_value(const Program& program, const Coefficient& coefficient,
-                        std::span<const double> parameters, double of_key) {
-  const double stiffness_factor = coefficient.is_fixed ? 1.0 : of_key;
+double untuned_value(const Program& program, const Coefficient& coefficient,
+                     std::span<const double> parameters) {
   const double value =
       value_of(std::span(program.steps).subspan(coefficient.first, coefficient.count), parameters);
   const double scaled = value * rate_factor(coefficient.unit, program.rate_ratio);
+  return coefficient.unit == Unit::inverse_mass        ? 1.0 / value
+         : coefficient.unit == Unit::inverse_impedance ? value
+         : coefficient.unit == Unit::gravity_per_rate  ? scaled / reference_rate_hz
+                                                       : scaled;
+}
+
+double tuned_value(const Program& program, const Coefficient& coefficient, double untuned,
+                   double of_key) {
+  const double stiffness_factor = coefficient.is_fixed ? 1.0 : of_key;
   switch (coefficient.unit) {
     case Unit::stiffness:
-      return scaled * stiffness_factor;
+      return untuned * stiffness_factor;
     case Unit::friction:
     case Unit::speed:
     case Unit::frequency:
-      return scaled * std::sqrt(stiffness_factor);
-    case Unit::inverse_mass:
-      return 1.0 / value;
+      return untuned * std::sqrt(stiffness_factor);
     case Unit::inverse_impedance:
       return rate_factor(coefficient.unit, program.rate_ratio) /
-             (value * std::sqrt(stiffness_factor));
+             (untuned * std::sqrt(stiffness_factor));
+    case Unit::inverse_mass:
     case Unit::gravity_per_rate:
-      return scaled / reference_rate_hz;
     case Unit::plain:
     case Unit::damping:
     case Unit::gravity:
-      return scaled;
+      return untuned;
   }
-  return scaled;
+  return untuned;
+}
+
+double continuous_value(const Program& program, const Coefficient& coefficient,
+                        std::span<const double> parameters, double stiffness_factor) {
+  return tuned_value(program, coefficient, untuned_value(program, coefficient, parameters),
+                     stiffness_factor);
 }
 
 double sampled_value(const Program& program, const Coefficient& coefficient,

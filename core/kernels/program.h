@@ -206,4 +206,11 @@ double continuous_value(const Program& program, const Coefficient& coefficient,
 double sampled_value(const Program& program, const Coefficient& coefficient,
                      std::span<const double> parameters, double stiffness_factor);
 
+// The two steps of continuous_value(): what the parameters give, and what the stiffness factor
+// makes of it. [any thread] wait-free
+double untuned_value(const Program& program, const Coefficient& coefficient,
+                     std::span<const double> parameters);
+double tuned_value(const Program& program, const Coefficient& coefficient, double untuned,
+                   double stiffness_factor);
+
 }  // namespace ressort::kernels
