@@ -205,14 +205,24 @@ typename S::V shared(const Program& program, const S& s, std::uint32_t from, std
   if (slot.first != program.taps[other].first) {
     return V{};  // the points are on two macros
   }
+  const auto near = behind(s, one);
+  const auto far = behind(s, other);
   if (slot.is_on_body()) {
-    const auto near = behind(s, one);
-    const auto far = behind(s, other);
     return sum_of<V>(near.count, [&](std::uint32_t i) {
       return near.weight[i] * far.weight[i] * part(near.node[i]);
     });
   }
   V sum{};
+  if (near.count > 0 && far.count > 0) {
+    for (std::uint32_t i = 0; i < near.count; ++i) {
+      for (std::uint32_t k = 0; k < far.count; ++k) {
+        if (near.node[i] == far.node[k]) {
+          sum += near.weight[i] * far.weight[k] * part(near.node[i]);
+        }
+      }
+    }
+    return sum;
+  }
   for (std::size_t lane = 0; lane < S::lanes; ++lane) {
     around(program, s, one, lane, [&](std::uint32_t pushed, auto weight) {
       around(program, s, other, lane, [&](std::uint32_t felt, auto share) {
