@@ -135,6 +135,24 @@ class alignas(64) InputDriver {
     }
   }
 
+  // Writes the next forces, `step` apart in memory, as repeated calls of next_force() would.
+  template <class T>
+  void fill_forces(std::size_t frames, std::size_t step, T* force) {
+    if (motion_ != Motion::follow && pulse_ == 0.0 && blow_left_ == 0 && held_frames_ == 0) {
+      BandNoise noise = burst_noise_;
+      double left = burst_left_;
+      for (std::size_t n = 0; n < frames; ++n) {
+        force[n * step] = static_cast<T>(value_ + next_of_burst(noise, left));
+      }
+      burst_noise_ = noise;
+      burst_left_ = left;
+      return;
+    }
+    for (std::size_t n = 0; n < frames; ++n) {
+      force[n * step] = static_cast<T>(next_force().value);
+    }
+  }
+
   InputSample next_force() {
     if (motion_ == Motion::follow) {
       approach();
@@ -159,13 +177,18 @@ class alignas(64) InputDriver {
       pulse += blow_ * blow_pulse_.at(blow_pulse_.count - blow_left_);
       --blow_left_;
     }
-    if (burst_left_ > 0.0) {
-      constexpr double inaudible = 1e-5;  // -100 dB of the burst's start
-      pulse += burst_ * burst_left_ * burst_noise_.next();
-      burst_left_ *= burst_kept_;
-      burst_left_ = burst_left_ < inaudible ? 0.0 : burst_left_;
+    return pulse + next_of_burst(burst_noise_, burst_left_);
+  }
+
+  double next_of_burst(BandNoise& noise, double& left) const {
+    if (!(left > 0.0)) {
+      return 0.0;
     }
-    return pulse;
+    constexpr double inaudible = 1e-5;  // -100 dB of the burst's start
+    const double now = burst_ * left * noise.next();
+    left *= burst_kept_;
+    left = left < inaudible ? 0.0 : left;
+    return now;
   }
 
   InputSample move() {

@@ -127,6 +127,7 @@ struct Bank {
     own_held_.common_row.resize(most_inputs);
     peak.resize(lanes);
     gain.resize(lanes);
+    factors.resize(rows_together * most_outputs);
     channels.resize(outputs_of_one);
     x.resize(nodes);
     v.resize(nodes);
@@ -202,6 +203,7 @@ struct Bank {
   Mixer<T> mixer;
   Aligned<T> peak;        // [lane]
   Aligned<T> gain;        // [lane]
+  Aligned<T> factors;     // [row of rows_together][output][lane] levels of the outputs
   std::vector<double> x;  // [node] positions of a voice that is inspected or taken over
   std::vector<double> v;
   std::vector<double*> channels;  // [output] destination of the mix

@@ -26,24 +26,22 @@ Comparison::Comparison(const Playing& playing, double rate_hz, std::size_t lanes
       kept_(std::exp(-static_cast<double>(step_) / (compared_s * rate_hz))),
       least_frames_(static_cast<std::size_t>(compared_s * rate_hz)),
       most_frames_(static_cast<std::size_t>(most_compared_s * rate_hz)),
-      rows_(lanes * max_block_frames),
+      kept_sums_(lanes * max_sums),
       sums_(lanes),
       past_(2 * lanes * response_.size()) {}
 
 void Comparison::follow(std::size_t frames, Voices& voices) {
-  for (std::size_t from = 0; from < frames;) {
-    const std::size_t to = std::min(frames, from + step_ - frame_);
+  std::size_t step = 0;
+  each_step(frames, [&](std::size_t from, std::size_t to) {
     for (std::size_t lane = 0; lane < voices.awake_end(); ++lane) {
-      double* const row = rows_.data() + lane * max_block_frames;
-      sums_[lane] = std::accumulate(row + from, row + to, sums_[lane]);
-      std::fill(row + from, row + to, 0.0);
+      sums_[lane] += std::exchange(kept_sums_[lane * max_sums + step], 0.0);
     }
+    ++step;
     frame_ += to - from;
-    from = to;
     if (frame_ == step_) {
       push(voices);
     }
-  }
+  });
 }
 
 // Ends a step: keeps its sums and compares what is heard of each pair of voices.

@@ -22,13 +22,14 @@ class Comparison {
   // Behind a body, earlier sound is still heard when a comparison begins.
   bool is_needed(const Voices& voices) const { return has_body_ || voices.is_comparing(); }
 
-  // Adds an output of a lane to the frames of this segment.
-  template <class Sample>
-  void keep(std::size_t lane, std::size_t frames, Sample&& sample) {
-    double* const row = rows_.data() + lane * max_block_frames;
-    for (std::size_t n = 0; n < frames; ++n) {
-      row[n] += sample(n);
-    }
+  // Adds the outputs of a lane in this segment: `count` numbers in each frame, `stride` apart.
+  template <class T>
+  void keep(std::size_t lane, std::size_t frames, std::size_t count, std::size_t stride,
+            const T* outputs) {
+    double* sum = kept_sums_.data() + lane * max_sums;
+    each_step(frames, [&](std::size_t from, std::size_t to) {
+      *sum++ += sum_of(outputs + from * count * stride, (to - from) * count, stride);
+    });
   }
 
   // Ends a segment. Calls invert(voice) for a new voice when the correlation of both voices over
@@ -37,6 +38,34 @@ class Comparison {
   void advance(std::size_t frames, Voices& voices, Invert&& invert);
 
  private:
+  // of a segment: a step has at least one frame, and the first may have begun before
+  static constexpr std::size_t max_sums = max_block_frames + 1;
+
+  // Calls use(from, to) for the frames of every step in a segment.
+  template <class Use>
+  void each_step(std::size_t frames, Use&& use) const {
+    std::size_t to = std::min(frames, step_ - frame_);
+    for (std::size_t from = 0; from < frames; from = to, to = std::min(frames, from + step_)) {
+      use(from, to);
+    }
+  }
+
+  // Four partial sums hide the latency of the additions.
+  template <class T>
+  static double sum_of(const T* y, std::size_t count, std::size_t stride) {
+    double sums[4] = {};
+    std::size_t i = 0;
+    for (; i + 4 <= count; i += 4) {
+      for (std::size_t k = 0; k < 4; ++k) {
+        sums[k] += static_cast<double>(y[(i + k) * stride]);
+      }
+    }
+    for (; i < count; ++i) {
+      sums[0] += static_cast<double>(y[i * stride]);
+    }
+    return (sums[0] + sums[1]) + (sums[2] + sums[3]);
+  }
+
   void follow(std::size_t frames, Voices& voices);
   void push(Voices& voices);
   double heard(std::size_t lane) const;
@@ -49,11 +78,11 @@ class Comparison {
   double kept_;               // share of a running sum that each step keeps
   std::size_t least_frames_;  // before the first decision
   std::size_t most_frames_;
-  std::vector<double> rows_;  // [lane][frame] sum of a voice's outputs
-  std::vector<double> sums_;  // [lane] of the current step
-  std::vector<double> past_;  // [lane][2 * responses] sums of the last steps, twice
-  std::size_t frame_ = 0;     // in the current step
-  std::size_t at_ = 0;        // the last step in `past_`
+  std::vector<double> kept_sums_;  // [lane][step of the segment] of a voice's outputs
+  std::vector<double> sums_;       // [lane] of the current step
+  std::vector<double> past_;       // [lane][2 * responses] sums of the last steps, twice
+  std::size_t frame_ = 0;          // in the current step
+  std::size_t at_ = 0;             // the last step in `past_`
 };
 
 template <class Invert>

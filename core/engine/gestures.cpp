@@ -369,9 +369,7 @@ void Gestures::fill_inputs(Bank<T>& bank, const VoiceGroup& group, std::size_t f
                                 static_cast<double>(v[lane % part.width]));
           }
         }
-        for (std::size_t n = 0; n < frames; ++n) {
-          value[n * step] = static_cast<T>(mover.next_force().value);
-        }
+        mover.fill_forces(frames, step, value);
       } else {
         bank.held->zero_velocities = 0;
         mover.fill_positions(frames, step, value, velocity);

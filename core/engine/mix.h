@@ -55,6 +55,8 @@ struct AudioInput {
   std::size_t width;  // lanes; 1 if there are several inputs
 };
 
+inline constexpr std::size_t rows_together = 8;
+
 using IsSilent = bool (*)(const double* samples, std::size_t frames);
 // Multiplies a channel by white noise: every `step`-th number of splitmix64() after `state`.
 using MakeNoise = void (*)(double* samples, std::size_t frames, std::uint64_t state,
@@ -66,6 +68,8 @@ struct Mixer {
   MakeNoise make_noise;
   // Writes the same row to every frame: value[frame * step + i].
   void (*fill_rows)(const T* row, std::size_t step, std::size_t frames, T* value);
+  // Multiplies every frame by the same row, which is given `rows_together` times.
+  void (*scale_rows)(const T* rows, std::size_t step, std::size_t frames, T* value);
   void (*add_audio)(const AudioInput<T>& input);
   // channels[output][frame] += sum of gain[lane] * y. Lanes with gain 0 may hold any values.
   void (*add_voices)(const Heard<T>& heard, const T* gain, double* const* channels);

@@ -74,6 +74,21 @@ void fill_rows(const T* row, std::size_t step, std::size_t frames, T* value) {
   }
 }
 
+// Several rows together fill whole packs, whatever their length.
+template <class T>
+void scale_rows(const T* rows, std::size_t step, std::size_t frames, T* value) {
+  using V = Pack<T, rows_together * sizeof(T)>;
+  for (; frames >= rows_together; frames -= rows_together, value += rows_together * step) {
+    for (std::size_t i = 0; i < step; ++i) {
+      store(value + i * rows_together,
+            load<V>(value + i * rows_together) * load<V>(rows + i * rows_together));
+    }
+  }
+  for (std::size_t i = 0; i < frames * step; ++i) {
+    value[i] *= rows[i];
+  }
+}
+
 // rows[n * step + lane] = (rest or rows[n * step + lane]) + added(n)
 template <class T, class Added>
 [[gnu::always_inline]] inline void add_rows(Added&& added, const T* rest, std::size_t frames,
@@ -350,7 +365,7 @@ void make_noise(double* samples, std::size_t frames, std::uint64_t state, std::u
 
 template <class T>
 Mixer<T> mixer_of() {
-  return {is_silent, make_noise, fill_rows<T>, add_audio<T>, add_voices<T>, mix<T>};
+  return {is_silent, make_noise, fill_rows<T>, scale_rows<T>, add_audio<T>, add_voices<T>, mix<T>};
 }
 
 }  // namespace

@@ -72,9 +72,8 @@ void Mixing::add(Bank<T>& bank, const VoiceGroup& group, const Segment& segment,
     }
     voice.peak = std::max(voice.peak, peak);
     if (comparison.is_needed(voices)) {
-      for (std::size_t output = 0; output < count; ++output) {
-        comparison.keep(lane, segment.frames, [&](std::size_t n) { return sample(n, output); });
-      }
+      comparison.keep(lane, segment.frames, count, width,
+                      bank.block->outputs.data() + lane - group.first);
     }
     if (!are_all_steady && !voice.is_steady()) {
       add_one(part.program, voice, segment, 0, segment.frames, sample);

@@ -1,5 +1,6 @@
 #include "core/engine/output_levels.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace ressort::engine {
@@ -70,21 +71,30 @@ void OutputLevels::follow(const Machine& machine, std::span<const double> parame
 template <class T>
 void OutputLevels::apply(Bank<T>& bank, const VoiceGroup& group, std::size_t frames) const {
   const PartBank<T>& part = bank.parts[group.part];
-  for (const Level& level : parts_[group.part]) {
-    if (level.frames == 0 && level.target == 1.0) {
-      continue;
+  const std::vector<Level>& levels = parts_[group.part];
+  const std::size_t row = part.row();
+  T* const outputs = bank.block->outputs.data();
+  if (std::any_of(levels.begin(), levels.end(), [](const Level& l) { return l.frames > 0; })) {
+    for (const Level& level : levels) {
+      for (std::size_t n = 0; n < frames; ++n) {
+        T* const lanes = outputs + n * row + level.output * part.width;
+        const T factor = static_cast<T>(level.after(n + 1));
+        std::transform(lanes, lanes + part.width, lanes, [=](T y) { return y * factor; });
+      }
     }
-    T* row = bank.block->outputs.data() + level.output * part.width;
-    T factor = static_cast<T>(level.target);
-    for (std::size_t n = 0; n < frames; ++n, row += part.row()) {
-      if (level.frames > 0) {
-        factor = static_cast<T>(level.after(n + 1));
-      }
-      for (std::size_t lane = 0; lane < part.width; ++lane) {
-        row[lane] *= factor;
-      }
+    return;
+  }
+  if (std::all_of(levels.begin(), levels.end(), [](const Level& l) { return l.target == 1.0; })) {
+    return;
+  }
+  std::fill_n(bank.factors.begin(), rows_together * row, T(1));
+  for (const Level& level : levels) {
+    for (std::size_t n = 0; n < rows_together; ++n) {
+      std::fill_n(bank.factors.data() + n * row + level.output * part.width, part.width,
+                  static_cast<T>(level.target));
     }
   }
+  bank.mixer.scale_rows(bank.factors.data(), row, frames, outputs);
 }
 
 void OutputLevels::advance(std::size_t frames) {
