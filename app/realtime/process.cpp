@@ -481,7 +481,10 @@ void Process::play_models(std::size_t input_count, std::size_t output_count, std
   }
   fade_left_ -= std::min(fade_left_, frames);
   if (limit_) {
-    dc_blocker_.process(out, frames);
+    const auto may_have_dc = [](const PlayingEngine* playing) {
+      return playing != nullptr && playing->engine->may_have_dc();
+    };
+    dc_blocker_.process(out, frames, may_have_dc(current_) || may_have_dc(fading_));
     limiter_.process(out, frames);
   }
   double peak = 0.0;

@@ -719,6 +719,10 @@ const Machine& Engine::machine() const {
   return player_->machine;
 }
 
+bool Engine::may_have_dc() const {
+  return !player_->playing.noise;
+}
+
 int Engine::output_count() const {
   return player_->body ? player_->body->output_count()
                        : static_cast<int>(player_->machine.channels);

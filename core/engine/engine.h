@@ -101,7 +101,9 @@ class Engine {
 
   const Machine& machine() const;  // [any thread]
   int output_count() const;        // [any thread]
-  EngineMeters meters() const;     // [audio]
+  // Returns whether the outputs may have a mean. Modulated noise has none. [any thread]
+  bool may_have_dc() const;
+  EngineMeters meters() const;  // [audio]
 
  private:
   struct Player;

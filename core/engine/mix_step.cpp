@@ -357,8 +357,8 @@ bool mix(const Heard<T>& heard, double bound, const T* gain, double* const* chan
 }
 
 void make_noise(double* samples, std::size_t frames, std::uint64_t state, std::uint64_t step) {
-  for (std::size_t n = 0; n < frames; ++n) {
-    std::uint64_t here = state + n * step * splitmix_step;
+  for (std::size_t n = 0; n < frames; ++n, state += step * splitmix_step) {
+    std::uint64_t here = state;
     samples[n] *= 0x1p-63 * static_cast<double>(static_cast<std::int64_t>(splitmix64(here)));
   }
 }

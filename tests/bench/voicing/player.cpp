@@ -129,7 +129,7 @@ void Player::run(const std::vector<TimedEvent>& events, double seconds, Stereo* 
       now.back().frame = static_cast<std::uint32_t>(frame > at ? frame - at : 0);
     }
     compiled_.engine->process(now, inputs, outputs, block_frames);
-    blocker_.process(outputs, block_frames);
+    blocker_.process(outputs, block_frames, compiled_.engine->may_have_dc());
     if (sound != nullptr) {
       for (std::size_t c = 0; c < 2; ++c) {
         const std::vector<double>& from = block[std::min(c, count - 1)];

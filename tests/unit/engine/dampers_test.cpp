@@ -502,6 +502,37 @@ TEST_CASE("DC is blocked below 5 Hz, and nothing above 60 Hz changes", "[dampers
   CHECK(nothing.back() == 0.0);
 }
 
+TEST_CASE("sound without DC passes the DC blocker, and a filtered sound follows without a step",
+          "[dampers]") {
+  DcBlocker blocker(48000.0);
+  std::vector<double> sound(64);
+  for (std::size_t n = 0; n < sound.size(); ++n) {
+    sound[n] = std::cos(0.1 * static_cast<double>(n));
+  }
+  const std::vector<double> before = sound;
+  double* const channel = sound.data();
+  blocker.process({&channel, 1}, sound.size(), false);
+  CHECK(sound == before);
+  // A constant that follows decays from its own level, by 1 - 2 pi 5 Hz / 48 kHz a sample.
+  std::vector<double> constant(480, before.back());
+  double* const after = constant.data();
+  blocker.process({&after, 1}, constant.size(), true);
+  CHECK(constant[0] == Approx(before.back()).epsilon(1e-3));
+  CHECK(constant[479] == Approx(before.back() * std::exp(-2.0 * std::numbers::pi * 5.0 * 0.01)));
+  // The filter goes on until it holds nothing, and passes again after silence.
+  std::vector<double> rest = before;
+  double* const third = rest.data();
+  blocker.process({&third, 1}, rest.size(), false);
+  CHECK(rest != before);
+  std::vector<double> silence(4800, 0.0);
+  double* const fourth = silence.data();
+  blocker.process({&fourth, 1}, silence.size(), false);
+  std::vector<double> again = before;
+  double* const fifth = again.data();
+  blocker.process({&fifth, 1}, again.size(), false);
+  CHECK(again == before);
+}
+
 TEST_CASE("the DC blocker filters each channel as it would alone", "[dampers]") {
   // Two channels are filtered together until one of them is silent. The bits must not depend on
   // that, nor on the block size.
