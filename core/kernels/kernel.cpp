@@ -12,6 +12,18 @@ Coefficients<T>::Coefficients(const Program& program, std::size_t width_in)
       target(value.size()),
       is_ramping(program.coefficients.size()) {
   ramping.reserve(program.coefficients.size());
+  // Lanes that no voice has used yet have their points where the others have them. Kernels save
+  // work where all lanes agree.
+  for (const TapSlot& tap : program.taps) {
+    for (const std::uint32_t c : {tap.u, tap.v}) {
+      const double start =
+          coefficient_value(program, program.coefficients[c], program.parameters, 1.0);
+      std::fill_n(value.begin() + static_cast<std::ptrdiff_t>(c * width), width,
+                  static_cast<T>(start));
+      std::copy_n(value.begin() + static_cast<std::ptrdiff_t>(c * width), width,
+                  target.begin() + static_cast<std::ptrdiff_t>(c * width));
+    }
+  }
 }
 
 template <class T>
