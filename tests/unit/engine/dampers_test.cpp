@@ -1,4 +1,5 @@
 // Properties of a note besides its pitch: loudness, brightness and the action of its damper.
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <numeric>
@@ -559,6 +560,31 @@ TEST_CASE("the DC blocker filters each channel as it would alone", "[dampers]") 
     blocker.process(channels, std::min(block, frames - at));
   }
   CHECK(sound == alone);
+}
+
+// Two channels of 331 samples, one silent in the middle, are filtered in blocks of 1 to 70 samples.
+TEST_CASE("the DC blocker gives the same bits with every instruction set", "[dampers]") {
+  DcPoles poles{.power = {1.0, 0.999, 0.998, 0.997, 0.996}, .quick = 0.95};
+  const auto filtered = [&](Isa isa) {
+    const FilterDc filter = with_isa(isa, []<Isa level>() { return dc_filter<level>(); });
+    std::vector<double> sound(2 * 331);
+    for (std::size_t n = 0; n < sound.size(); ++n) {
+      sound[n] = n > 100 && n < 200 ? 0.0 : 0.5 + std::sin(0.1 * static_cast<double>(n));
+    }
+    DcState states[2];
+    for (std::size_t at = 0, block = 1; at < 331; at += block, block = block % 70 + 1) {
+      const std::array<double*, 2> channels{sound.data() + at, sound.data() + 331 + at};
+      filter(channels, std::min<std::size_t>(block, 331 - at), poles, states);
+    }
+    return sound;
+  };
+  const std::vector<double> expected = filtered(Isa::base);
+  CHECK(support::peak(expected) > 0.5);
+  for (const Isa isa : {Isa::v3, Isa::v4}) {
+    if (has_isa(isa)) {
+      CHECK(filtered(isa) == expected);
+    }
+  }
 }
 
 }  // namespace
