@@ -1,4 +1,3 @@
-#include <string>
 
 #include "app/command_line/command_lines.h"
 #include "app/command_line/options.h"

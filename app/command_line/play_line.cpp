@@ -1,5 +1,4 @@
 #include <string>
-#include <vector>
 
 #include "app/command_line/command_lines.h"
 #include "app/command_line/options.h"

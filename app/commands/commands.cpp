@@ -11,7 +11,6 @@
 
 #include "app/commands/flight/flight_player.h"
 #include "app/commands/progress_bar.h"
-#include "app/say.h"
 #include "app/session/load_progress.h"
 #include "app/session/problem_reports.h"
 

@@ -1,7 +1,6 @@
 #include "app/control/console_commands.h"
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <cmath>
 #include <cstdio>

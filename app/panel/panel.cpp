@@ -20,7 +20,6 @@
 #include "app/panel/osc_query.h"
 #include "app/panel/page.h"
 #include "app/panel/state.h"
-#include "app/text.h"
 
 namespace ressort::panel {
 namespace {

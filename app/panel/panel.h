@@ -12,7 +12,6 @@
 // (osc_query.h).
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <string>
 

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <set>
 #include <utility>
-#include <variant>
 
 #include "core/compile/instrument.h"
 #include "core/kernels/modal/modal_form.h"

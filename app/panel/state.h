@@ -1,11 +1,9 @@
 // app/panel: the data of the page as JSON: the registry's rows and the current scene.
 #pragma once
 
-#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "app/session/session.h"
 

@@ -1,7 +1,6 @@
 // app/session: the worker thread: loads, reloads, analyses, and reads the audio thread's reports.
 #pragma once
 
-#include <functional>
 #include <optional>
 #include <set>
 #include <string>

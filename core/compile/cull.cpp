@@ -1,7 +1,5 @@
 #include "core/compile/cull.h"
 
-#include <algorithm>
-
 namespace ressort::compile {
 namespace {
 

@@ -1,7 +1,6 @@
 #include "core/compile/machine.h"
 
 #include <algorithm>
-#include <array>
 #include <map>
 #include <numeric>
 #include <tuple>

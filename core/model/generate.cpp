@@ -1,7 +1,6 @@
 #include "core/model/generate.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>

@@ -1,7 +1,6 @@
 // core/model: interpolates between networks of the same structure, by a parameter.
 #pragma once
 
-#include <cstddef>
 #include <span>
 #include <string>
 #include <vector>

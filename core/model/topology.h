@@ -1,7 +1,6 @@
 // core/model: expands macros to masses and links.
 #pragma once
 
-#include <span>
 #include <vector>
 
 #include "core/model/network.h"

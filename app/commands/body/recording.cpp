@@ -1,7 +1,6 @@
 #include "app/commands/body/recording.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 
 #include "app/commands/body/body.h"

@@ -16,7 +16,6 @@
 #include "app/realtime/lockfree.h"
 #include "app/session/files.h"
 #include "app/text.h"
-#include "core/model/language/expression.h"
 #include "core/solids/shell.h"
 
 namespace ressort::commands {

@@ -1,7 +1,6 @@
 #include "app/commands/body/statistical.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <utility>
 

@@ -1,7 +1,6 @@
 // app/commands: writes a body whose modes are drawn from statistics.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 

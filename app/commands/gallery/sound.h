@@ -1,7 +1,6 @@
 // app/commands: figures of a sound, measured from its samples alone. Pure.
 #pragma once
 
-#include <cstddef>
 #include <optional>
 #include <vector>
 

@@ -19,7 +19,6 @@
 #include "app/session/modes/known_modes.h"
 #include "app/session/new_file.h"
 #include "app/session/timbre/shape.h"
-#include "app/text.h"
 #include "core/model/preset/edit.h"
 
 namespace ressort::commands {

@@ -8,14 +8,11 @@
 #include <array>
 #include <cerrno>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <future>
 #include <iterator>
 #include <map>
 #include <mutex>
-#include <optional>
-#include <string_view>
 #include <system_error>
 #include <thread>
 

@@ -1,7 +1,6 @@
 // The text format of flights: a line begins with a word and has numbers after it. An embedded file
 // has a line with its size in bytes and its name.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 

@@ -1,7 +1,6 @@
 #include "core/analysis/modes/known_shapes.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 namespace ressort::analysis {

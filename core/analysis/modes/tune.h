@@ -4,8 +4,6 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <string_view>
-#include <vector>
 
 #include "core/analysis/modes/modes.h"
 #include "core/model/network.h"

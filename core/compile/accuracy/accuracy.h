@@ -9,7 +9,6 @@
 
 #include <complex>
 #include <cstddef>
-#include <limits>
 #include <optional>
 #include <span>
 #include <vector>

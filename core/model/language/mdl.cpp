@@ -1,7 +1,6 @@
 #include "core/model/language/mdl.h"
 
 #include <algorithm>
-#include <cctype>
 
 #include "core/model/language/expression.h"
 #include "core/model/language/reader.h"

@@ -1,6 +1,5 @@
 // Evaluates FAUST expressions: arithmetic, sliders, definitions, and `signal : function`.
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <numbers>
 #include <utility>

@@ -2,9 +2,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cmath>
-
-#include "core/model/language/expression.h"
 
 namespace ressort::model {
 namespace {

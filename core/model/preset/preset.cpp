@@ -4,14 +4,11 @@
 #include <cctype>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
-#include <optional>
 #include <set>
 
 #include "core/model/language/expression.h"
 #include "core/model/language/tokens.h"
 #include "core/model/preset/toml_table.h"
-#include "core/model/topology.h"
 
 namespace ressort::model {
 namespace {
