@@ -147,7 +147,7 @@ auto particular_options(const CLI::App& command) {
   std::vector<std::pair<std::string, std::string>> given;
   for (const CLI::Option* option : command.get_options()) {
     std::string group = option->get_group();
-    std::transform(group.begin(), group.end(), group.begin(), ::tolower);
+    std::ranges::transform(group, group.begin(), ::tolower);
     const bool is_common = option->check_name("FILE") || option->check_name("--output") ||
                            option->check_name("--force");
     if (option->count() > 0 && !is_common) {

@@ -270,8 +270,8 @@ std::string conclusion(const Scene& scene, const Proved& proved) {
   }
   std::string text = has_ranges ? "stable in all ranges of the parameters" : "stable";
   const auto& parameters = scene.network.parameters;
-  if (std::any_of(parameters.begin(), parameters.end(),
-                  [](const Parameter& parameter) { return parameter.audio_input > 0; })) {
+  if (std::ranges::any_of(parameters,
+                          [](const Parameter& parameter) { return parameter.audio_input > 0; })) {
     text += has_ranges ? "" : " at the initial values";
     text += ", while the inputs stay within the limits above";
   }
@@ -338,10 +338,10 @@ int check(const CheckOptions& options) {
   std::optional<Proved> proved;
   if (compiled && options.as != CheckAs::model) {
     proved = prove(*reading.scene, *compiled, progress);
-    const bool is_told =
-        compiled->stability.complaint ||
-        std::any_of(compiled->bodies.begin(), compiled->bodies.end(),
-                    [](const CompiledBody& body) { return body.stability.complaint.has_value(); });
+    const bool is_told = compiled->stability.complaint ||
+                         std::ranges::any_of(compiled->bodies, [](const CompiledBody& body) {
+                           return body.stability.complaint.has_value();
+                         });
     if (!is_told) {
       warn(*proved, *reading.scene, reading.findings);
     }

@@ -77,9 +77,8 @@ Result<std::vector<ScoreLine>> read_score(const RenderOptions& options) {
 }
 
 bool plays_notes(const std::vector<ScoreLine>& lines) {
-  return std::any_of(lines.begin(), lines.end(), [](const ScoreLine& line) {
-    return line.message.address.starts_with("/note");
-  });
+  return std::ranges::any_of(
+      lines, [](const ScoreLine& line) { return line.message.address.starts_with("/note"); });
 }
 
 // Returns a warning about options for keys that have no effect, or an empty string.
@@ -140,8 +139,7 @@ Result<std::vector<ScoredEvent>> score_events(const RenderOptions& options,
       }
     }
   }
-  std::stable_sort(scored.begin(), scored.end(),
-                   [](const ScoredEvent& a, const ScoredEvent& b) { return a.frame < b.frame; });
+  std::ranges::stable_sort(scored, {}, &ScoredEvent::frame);
   return scored;
 }
 
@@ -321,10 +319,9 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
     return Error{midi->warnings.front() + "; --strict refuses damaged files"};
   }
   scene->warnings.insert(scene->warnings.end(), midi->warnings.begin(), midi->warnings.end());
-  const auto changes = std::count_if(midi->messages.begin(), midi->messages.end(),
-                                     [&](const MidiFile::Message& message) {
-                                       return (midi->bytes_of(message)[0] & 0xf0) == 0xc0;
-                                     });
+  const auto changes = std::ranges::count_if(midi->messages, [&](const MidiFile::Message& message) {
+    return (midi->bytes_of(message)[0] & 0xf0) == 0xc0;
+  });
   if (changes > 0) {
     scene->warnings.push_back(
         options.midi + ": " +

@@ -92,7 +92,7 @@ void print_status() {
   for (const StatusRow& row : status_rows()) {
     rows.push_back(&row);
   }
-  std::stable_sort(rows.begin(), rows.end(), [](const StatusRow* a, const StatusRow* b) {
+  std::ranges::stable_sort(rows, [](const StatusRow* a, const StatusRow* b) {
     return static_cast<unsigned>(a->place) < static_cast<unsigned>(b->place);
   });
   print_head({"place", "figure", "unit", "meaning"});
@@ -137,8 +137,7 @@ std::span<const ReferencePart> reference_parts() {
 }
 
 int reference(std::string_view name) {
-  const auto* const part = std::find_if(std::begin(parts), std::end(parts),
-                                        [&](const ReferencePart& p) { return p.name == name; });
+  const auto* const part = std::ranges::find(parts, name, &ReferencePart::name);
   if (part == std::end(parts)) {
     return exit_code::wrong_use;
   }

@@ -130,8 +130,7 @@ std::vector<std::string> files(const std::string& typed,
     std::error_code unknown;
     if (at->is_directory(unknown)) {
       found.push_back(folder + name + "/");
-    } else if (std::find(endings.begin(), endings.end(), at->path().extension().string()) !=
-               endings.end()) {
+    } else if (std::ranges::find(endings, at->path().extension().string()) != endings.end()) {
       found.push_back(folder + name);
     }
   }
@@ -192,9 +191,8 @@ Result<Command> parse_command(std::string_view line) {
   if (is_repeated) {
     wanted.pop_back();
   }
-  const auto needed = static_cast<std::size_t>(
-      std::count_if(wanted.begin(), wanted.end(),
-                    [](const std::string& word) { return !word.starts_with('['); }));
+  const auto needed = static_cast<std::size_t>(std::ranges::count_if(
+      wanted, [](const std::string& word) { return !word.starts_with('['); }));
   // A word written as [--WORD] may be omitted but not replaced by another word.
   bool is_other = false;
   for (std::size_t i = needed; i < std::min(words.size(), wanted.size()); ++i) {
@@ -327,7 +325,7 @@ std::vector<std::string> Console::completions(std::string_view line) const {
     add(files(typed, sound_endings()));
   }
   std::erase_if(words, [&](const std::string& word) { return !word.starts_with(typed); });
-  std::sort(words.begin(), words.end());
+  std::ranges::sort(words);
   words.erase(std::unique(words.begin(), words.end()), words.end());
   return words;
 }

@@ -56,7 +56,7 @@ Result<std::vector<Event>> play(ConsoleContext& console, const Message& message)
 std::string meant_parameter(const Instrument& instrument, const std::string& word) {
   const auto& known = instrument.parameters;
   const auto is = [&](bool in_any_case) {
-    return std::find_if(known.begin(), known.end(), [&](const ParameterInfo& info) {
+    return std::ranges::find_if(known, [&](const ParameterInfo& info) {
       return in_any_case ? same_but_case(info.name, word) : info.name == word;
     });
   };
@@ -429,7 +429,7 @@ std::vector<std::vector<std::string>> control_rows(const ConsoleContext& console
   }
   for (const ControlSetting& control : current.preset.controls) {
     const bool is_replaced = control.source == ControlSource::controller &&
-                             std::any_of(mapping.begin(), mapping.end(), [&](const MappedRow& row) {
+                             std::ranges::any_of(mapping, [&](const MappedRow& row) {
                                return row.exists &&
                                       row.setting.input.source == ControllerSource::controller &&
                                       row.setting.input.number == control.number;

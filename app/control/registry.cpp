@@ -171,8 +171,7 @@ std::vector<const Row*> command_rows() {
       found.push_back(&row);
     }
   }
-  std::stable_sort(found.begin(), found.end(),
-                   [](const Row* a, const Row* b) { return a->group < b->group; });
+  std::ranges::stable_sort(found, {}, &Row::group);
   return found;
 }
 
@@ -216,7 +215,7 @@ std::vector<std::string> addresses_meant(const std::string& pattern, const Instr
   // A name may itself be a pattern: the rest of the address must match.
   const auto try_name = [&](std::string_view before, std::string_view after) {
     std::size_t at = 0;  // where the name begins in the pattern
-    for (auto slashes = std::count(before.begin(), before.end(), '/'); slashes > 0; --slashes) {
+    for (auto slashes = std::ranges::count(before, '/'); slashes > 0; --slashes) {
       at = std::min(pattern.find('/', at), pattern.size() - 1) + 1;
     }
     const std::size_t size = std::min(pattern.find('/', at), pattern.size()) - at;
@@ -249,11 +248,11 @@ std::vector<std::string> addresses_meant(const std::string& pattern, const Instr
 
 bool is_answer(std::string_view address) {
   const auto all = answers();
-  return std::find(all.begin(), all.end(), address) != all.end();
+  return std::ranges::find(all, address) != all.end();
 }
 
 bool is_reserved(std::string_view address) {
-  return is_answer(address) || std::any_of(rows().begin(), rows().end(), [&](const Row& row) {
+  return is_answer(address) || std::ranges::any_of(rows(), [&](const Row& row) {
            const Pattern pattern = pattern_of(row);
            return pattern.hole.empty() ? address == row.address
                                        : address.starts_with(pattern.before);
@@ -262,9 +261,9 @@ bool is_reserved(std::string_view address) {
 
 Events to_events(const Message& message, const Instrument& instrument, std::uint32_t serial) {
   auto [row, name] = find_row(message.address);
-  if (row == nullptr &&
-      std::any_of(instrument.custom.begin(), instrument.custom.end(),
-                  [&](const CustomInfo& info) { return info.address == message.address; })) {
+  if (row == nullptr && std::ranges::any_of(instrument.custom, [&](const CustomInfo& info) {
+        return info.address == message.address;
+      })) {
     row = &custom_row;
   }
   if (row == nullptr || row->play == nullptr) {
@@ -276,7 +275,7 @@ Events to_events(const Message& message, const Instrument& instrument, std::uint
                 .name = name,
                 .gesture = row->gesture};
   if (pattern_of(*row).hole == "N") {
-    if (!std::all_of(name.begin(), name.end(), [](char c) { return c >= '0' && c <= '9'; })) {
+    if (!std::ranges::all_of(name, [](char c) { return c >= '0' && c <= '9'; })) {
       return unknown(message, instrument);
     }
     const auto input = find_input(message, instrument, name);

@@ -165,8 +165,7 @@ constexpr StatusRow status_table[] = {
 
 // Null after the last position.
 const StatusRow* row_at(int place) {
-  const auto* const row = std::find_if(std::begin(status_table), std::end(status_table),
-                                       [&](const StatusRow& r) { return r.place == place; });
+  const auto* const row = std::ranges::find(status_table, place, &StatusRow::place);
   return row != std::end(status_table) ? row : nullptr;
 }
 

@@ -451,8 +451,8 @@ struct Terminal::Input {
       put("\n" + in_columns(words));
       return CC_REDISPLAY;
     }
-    const auto characters = std::count_if(typed.begin(), typed.end(),
-                                          [](char byte) { return !is_inside_character(byte); });
+    const auto characters =
+        std::ranges::count_if(typed, [](char byte) { return !is_inside_character(byte); });
     el_deletestr(editor, static_cast<int>(characters));
     el_insertstr(editor, text.c_str());
     return words.size() == 1 ? CC_REFRESH : CC_REFRESH_BEEP;

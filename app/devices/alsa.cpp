@@ -180,10 +180,9 @@ int configure(Stream& alsa, unsigned channels, double rate_hz, snd_pcm_uframes_t
   int failure = snd_pcm_hw_params_any(alsa.pcm, hardware);
   const auto step = [&](int result) { failure = failure < 0 ? failure : result; };
   step(snd_pcm_hw_params_set_access(alsa.pcm, hardware, SND_PCM_ACCESS_RW_INTERLEAVED));
-  const auto* format =
-      std::find_if(std::begin(formats), std::end(formats), [&](snd_pcm_format_t wanted) {
-        return snd_pcm_hw_params_test_format(alsa.pcm, hardware, wanted) == 0;
-      });
+  const auto* format = std::ranges::find_if(formats, [&](snd_pcm_format_t wanted) {
+    return snd_pcm_hw_params_test_format(alsa.pcm, hardware, wanted) == 0;
+  });
   alsa.format = format != std::end(formats) ? *format : SND_PCM_FORMAT_S16;
   alsa.channels = channels;
   alsa.rate_hz = static_cast<unsigned>(rate_hz);

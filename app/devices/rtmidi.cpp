@@ -110,7 +110,7 @@ void MidiInput::tick() {
       }
     }
     std::erase_if(s.sources, [&](const auto& source) {
-      return std::find(present.begin(), present.end(), source.first) == present.end();
+      return std::ranges::find(present, source.first) == present.end();
     });
   } catch (const RtMidiError&) {
     return;  // a source vanished meanwhile; the next tick handles it

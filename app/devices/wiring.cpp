@@ -7,7 +7,7 @@ namespace ressort::devices {
 void Wiring::update(const std::vector<Cable>& present,
                     const std::function<bool(const std::string& port)>& exists, bool is_quiet) {
   for (Known& known : known_) {
-    const bool is_there = std::find(present.begin(), present.end(), known.cable) != present.end();
+    const bool is_there = std::ranges::find(present, known.cable) != present.end();
     if (is_there) {
       known.state = State::plugged;
     } else if (known.state == State::plugged) {
@@ -27,8 +27,8 @@ void Wiring::update(const std::vector<Cable>& present,
 }
 
 bool Wiring::is_in_doubt() const {
-  return std::any_of(known_.begin(), known_.end(),
-                     [](const Known& known) { return known.state == State::doubtful; });
+  return std::ranges::any_of(known_,
+                             [](const Known& known) { return known.state == State::doubtful; });
 }
 
 std::vector<Cable> Wiring::missing() const {
@@ -42,8 +42,7 @@ std::vector<Cable> Wiring::missing() const {
 }
 
 bool Wiring::knows(const Cable& cable) const {
-  return std::any_of(known_.begin(), known_.end(),
-                     [&](const Known& known) { return known.cable == cable; });
+  return std::ranges::any_of(known_, [&](const Known& known) { return known.cable == cable; });
 }
 
 void Wiring::mark_missing(const std::string& theirs) {

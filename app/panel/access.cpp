@@ -16,7 +16,7 @@ PanelAccess::PanelAccess(int port, const std::vector<std::string>& hosts, std::s
 }
 
 bool PanelAccess::is_host(std::string_view host) const {
-  return std::find(hosts_.begin(), hosts_.end(), host) != hosts_.end();
+  return std::ranges::find(hosts_, host) != hosts_.end();
 }
 
 bool PanelAccess::is_origin(std::string_view origin) const {

@@ -289,9 +289,8 @@ struct WebPanel::Server {
     static const std::set<std::string> ours = {"/describe", "/network", "/modes",
                                                "/motion",   "/events",  "/osc"};
     const std::span<const PageFile> files = page_files();
-    const bool is_file = std::any_of(files.begin(), files.end(), [&](const PageFile& file) {
-      return file.path == request.path;
-    });
+    const bool is_file =
+        std::ranges::any_of(files, [&](const PageFile& file) { return file.path == request.path; });
     const bool wants_tree = request.get_header_value("Accept").find("json") != std::string::npos;
     const bool asks = request.has_param("HOST_INFO") || !(is_file || ours.contains(request.path)) ||
                       (request.path == "/" && wants_tree);
@@ -522,7 +521,7 @@ std::string WebPanel::address() const {
   std::string host = bound == "localhost" ? "127.0.0.1" : bound;
   if (bound == "0.0.0.0") {
     const std::vector<std::string> own = own_addresses();
-    const auto other = std::find_if_not(own.begin(), own.end(), is_loopback);
+    const auto other = std::ranges::find_if_not(own, is_loopback);
     host = other != own.end() ? *other : "127.0.0.1";
   }
   return "http://" + host + ":" + std::to_string(server_->port) +

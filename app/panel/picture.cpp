@@ -75,7 +75,7 @@ std::vector<Picture::Waveguide> take_waveguides(const Program& program, const Ne
       const JunctionSlot& junction = program.junctions[i];
       const Mass& point = network.masses[program.masses[junction.node]];
       waveguide.macro = network.taps[point.tap].macro;
-      const auto dot = std::find(nodes.begin(), nodes.end(), junction.node);
+      const auto dot = std::ranges::find(nodes, junction.node);
       if (dot != nodes.end()) {
         const double u =
             coefficient_value(program, program.coefficients[junction.u], program.parameters, 1.0);
@@ -83,8 +83,7 @@ std::vector<Picture::Waveguide> take_waveguides(const Program& program, const Ne
             {std::clamp(u, 0.0, 1.0), first_dot + static_cast<std::size_t>(dot - nodes.begin())});
       }
     }
-    std::sort(waveguide.places.begin(), waveguide.places.end(),
-              [](const auto& a, const auto& b) { return a.u < b.u; });
+    std::ranges::sort(waveguide.places, [](const auto& a, const auto& b) { return a.u < b.u; });
   }
   return taken;
 }
@@ -139,15 +138,14 @@ Picture make_picture(Engine& engine, const Network& network, std::uint32_t numbe
       return !input.is_force && input.node == node;
     };
     const auto is_place = [&](const TapSlot& tap) { return tap.is_on_body() && tap.node == node; };
-    if (std::any_of(program.taps.begin(), program.taps.end(), is_place)) {
+    if (std::ranges::any_of(program.taps, is_place)) {
       if (program.masses[node] >= network.masses.size()) {
         return false;  // the bridge of a modal string, which the model does not name
       }
       return known.insert(struck_name(network, program.masses[node])).second;
     }
     return node < program.moving ||
-           (!program.form.is<Modes>() &&
-            std::any_of(program.inputs.begin(), program.inputs.end(), is_hand));
+           (!program.form.is<Modes>() && std::ranges::any_of(program.inputs, is_hand));
   };
   for (const Program& program : machine.parts) {
     all += program.moving + program.inputs.size();
@@ -162,8 +160,8 @@ Picture make_picture(Engine& engine, const Network& network, std::uint32_t numbe
   // Inputs and outputs are always drawn.
   const auto is_port = [](const Program& program, std::size_t node) {
     const auto is_here = [&](const auto& slot) { return slot.node == node; };
-    return std::any_of(program.inputs.begin(), program.inputs.end(), is_here) ||
-           std::any_of(program.outputs.begin(), program.outputs.end(), is_here);
+    return std::ranges::any_of(program.inputs, is_here) ||
+           std::ranges::any_of(program.outputs, is_here);
   };
   std::size_t room = MotionFrame::most_numbers;
   std::size_t nodes_left = most_nodes;
@@ -177,7 +175,7 @@ Picture make_picture(Engine& engine, const Network& network, std::uint32_t numbe
         nodes.emplace_back(program.masses[node], node);
       }
     }
-    std::sort(nodes.begin(), nodes.end());
+    std::ranges::sort(nodes);
     nodes.resize(std::min(nodes.size(), nodes_left));
     nodes_left -= nodes.size();
     Picture::Group group{.first = picture.masses.size(), .count = nodes.size()};
@@ -215,8 +213,8 @@ Picture make_picture(Engine& engine, const Network& network, std::uint32_t numbe
 }
 
 void find_positions(const Picture& picture, const MotionFrame& frame, std::span<float> positions) {
-  std::transform(picture.start.begin(), picture.start.end(), positions.begin(),
-                 [](double x) { return static_cast<float>(x); });
+  std::ranges::transform(picture.start, positions.begin(),
+                         [](double x) { return static_cast<float>(x); });
   std::size_t at = 0;
   for (const Picture::Group& group : picture.groups) {
     if (at + group.numbers() > frame.count) {

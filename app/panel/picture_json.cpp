@@ -171,7 +171,7 @@ class NetworkJsonWriter {
     for (const Picture::Waveguide::Place& place : waveguide.places) {
       line.emplace_back(place.u, place.dot);
     }
-    std::sort(line.begin(), line.end());
+    std::ranges::sort(line);
     for (std::size_t i = 1; i < line.size(); ++i) {
       lines.push_back({line[i - 1].second, line[i].second, static_cast<int>(linear_law)});
     }

@@ -131,7 +131,7 @@ class ScriptWriter {
       legend_height_ = legend_line * static_cast<double>(lines) + 12.0;
     }
     if (!figure.caption.empty()) {
-      const auto lines = 1 + std::count(figure.caption.begin(), figure.caption.end(), '\n');
+      const auto lines = 1 + std::ranges::count(figure.caption, '\n');
       caption_height_ = caption_line * static_cast<double>(lines) + 12.0;
     }
     height_ = (figure.title.empty() ? 0.0 : title_height) + panels_height_ + legend_height_ +
@@ -212,8 +212,8 @@ class ScriptWriter {
       write_edges(place.left + margins.left, place.left + place.width - margins.right,
                   place.bottom + margins.bottom, place.bottom + place.height - margins.top);
     }
-    const bool has_key = std::any_of(panel.series.begin(), panel.series.end(),
-                                     [](const Series& series) { return !series.title.empty(); });
+    const bool has_key = std::ranges::any_of(
+        panel.series, [](const Series& series) { return !series.title.empty(); });
     script_ +=
         "set title " + quoted(panel.title) + " font 'sans,11' noenhanced offset 0,-0.6\n" +
         commands_of("x", x, panel.has_axes) + commands_of("y", y, panel.has_axes) +

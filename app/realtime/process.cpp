@@ -142,8 +142,8 @@ void Process::run(std::span<const Sample* const> inputs, std::span<Sample* const
 }
 
 bool Process::send(Ring<TimedEvent>& ring, std::span<const TimedEvent> events) {
-  const bool ends = std::any_of(events.begin(), events.end(),
-                                [](const TimedEvent& timed) { return ends_sound(timed.event); });
+  const bool ends =
+      std::ranges::any_of(events, [](const TimedEvent& timed) { return ends_sound(timed.event); });
   const std::size_t spare =
       (ends ? 0 : max_endings) + (&ring == &from_osc ? ahead_.free() : std::size_t{0});
   const bool has_room = ring.push_all(events, spare);
@@ -205,7 +205,7 @@ void Process::collect_events(std::size_t frames, std::span<const MidiPacket> mid
   meters_.malformed = midi_.malformed();
   const auto earlier = [](const Pending& a, const Pending& b) { return later(b, a); };
   if (!std::is_sorted(now_.begin(), now_.end(), earlier)) {
-    std::sort(now_.begin(), now_.end(), earlier);
+    std::ranges::sort(now_, earlier);
   }
 }
 

@@ -31,7 +31,7 @@ Finding in_preset(const Scene& scene, const Error& error) {
 }  // namespace
 
 bool CompiledScene::is_accepted() const {
-  return std::none_of(findings.begin(), findings.end(), [](const Finding& finding) {
+  return std::ranges::none_of(findings, [](const Finding& finding) {
     return finding.diagnostic.severity == Severity::error;
   });
 }
@@ -74,8 +74,7 @@ CompiledScene compile_to_play(const Scene& scene, const CompileOptions& options,
   }
   const std::vector<Part>& parts = compiled->plan.parts;
   const auto broken = missed_budget(compiled->plan);
-  if (broken &&
-      std::none_of(parts.begin(), parts.end(), [](const Part& part) { return part.may_gain; })) {
+  if (broken && std::ranges::none_of(parts, &Part::may_gain)) {
     Finding finding = finding_of(scene.path, "", Error{*broken});
     finding.diagnostic.severity = is_strict ? Severity::error : Severity::warning;
     admission.findings.push_back(std::move(finding));

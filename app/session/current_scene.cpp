@@ -127,9 +127,8 @@ void CurrentScene::begin_change(const std::vector<std::string>& names) {
   }
   const bool continues_last =
       last_change_ && !last_change_->scene && now - change_time_ < 1s &&
-      std::equal(change.values.begin(), change.values.end(), last_change_->values.begin(),
-                 last_change_->values.end(),
-                 [](const auto& a, const auto& b) { return a.first == b.first; });
+      std::ranges::equal(change.values, last_change_->values,
+                         [](const auto& a, const auto& b) { return a.first == b.first; });
   change_time_ = now;
   if (!continues_last) {
     last_change_ = std::move(change);
@@ -217,9 +216,7 @@ void CurrentScene::show_parameter(ControlSource source, int number, const std::s
                                   MappedTarget& target) const {
   const auto& parameters = loaded_->instrument.parameters;
   for (const ControlSetting& control : loaded_->preset.controls) {
-    const auto found =
-        std::find_if(parameters.begin(), parameters.end(),
-                     [&](const ParameterInfo& info) { return info.name == control.target; });
+    const auto found = std::ranges::find(parameters, control.target, &ParameterInfo::name);
     if (control.source == source && control.number == number && control.address == address &&
         control.gesture == Gesture::parameter && found != parameters.end()) {
       target.has_parameter = true;
@@ -311,7 +308,7 @@ Result<std::size_t> CurrentScene::unlearn(const std::string& target) {
   }
   const auto written = write_mapping(
       [&](const ControllerSetting& row) {
-        return std::find(dropped.begin(), dropped.end(), row) != dropped.end();
+        return std::ranges::find(dropped, row) != dropped.end();
       },
       std::nullopt);
   return written ? Result<std::size_t>(dropped.size()) : written.error();
@@ -343,7 +340,7 @@ std::optional<Learned> CurrentScene::assign_turned_knob() {
     return row.setting.input.source == input->source && row.setting.input.number == input->number &&
            row.setting.input.channel != ControllerInput::any_channel;
   };
-  if (std::none_of(mapping_.begin(), mapping_.end(), is_alike)) {
+  if (std::ranges::none_of(mapping_, is_alike)) {
     setting.input.channel = ControllerInput::any_channel;
   }
   for (const MappedRow& row : mapping_) {
@@ -407,9 +404,9 @@ std::vector<ParameterSetting> changed_settings(const std::vector<ParameterInfo>&
   std::vector<ParameterSetting> changed;
   for (std::size_t i = 0; i < values.size(); ++i) {
     const ParameterInfo& info = parameters[i];
-    const bool is_in_preset =
-        std::any_of(preset.parameters.begin(), preset.parameters.end(),
-                    [&](const ParameterSetting& setting) { return setting.name == info.name; });
+    const bool is_in_preset = std::ranges::any_of(
+        preset.parameters,
+        [&](const ParameterSetting& setting) { return setting.name == info.name; });
     if (info.audio_input == 0 && (is_in_preset || values[i] != info.value)) {
       changed.push_back(
           {info.name, values[i], std::max(info.minimum, -most), std::min(info.maximum, most)});

@@ -64,15 +64,14 @@ std::string names_of_presets() {
 std::vector<std::string> names_in(const char* kind, const char* ending) {
   std::vector<std::string> all;
   std::vector<fs::path> folders = known_folders();
-  std::reverse(folders.begin(), folders.end());
+  std::ranges::reverse(folders);
   for (const fs::path& folder : folders) {
     std::set<std::string> names;
     std::error_code error;
     fs::directory_iterator entry(folder / kind, error);
     for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
       const std::string name = entry->path().stem().string();
-      if (entry->path().extension() == ending &&
-          std::find(all.begin(), all.end(), name) == all.end()) {
+      if (entry->path().extension() == ending && std::ranges::find(all, name) == all.end()) {
         names.insert(name);
       }
     }
@@ -92,9 +91,8 @@ std::string known_path(const char* kind, const std::string& file) {
 }
 
 std::string in_any_case(const std::string& name, const std::vector<std::string>& known) {
-  const auto found = std::find_if(known.begin(), known.end(), [&](const std::string& candidate) {
-    return same_but_case(candidate, name);
-  });
+  const auto found = std::ranges::find_if(
+      known, [&](const std::string& candidate) { return same_but_case(candidate, name); });
   return found == known.end() ? "" : *found;
 }
 
@@ -265,7 +263,7 @@ std::optional<std::string> own_file(const std::string& path) {
   const fs::path found = fs::canonical(path, error);
   const fs::path endings[] = {".mdl", ".toml", ".scl", ".ascl", ".kbm"};
   if (error || !fs::is_regular_file(found, error) ||
-      std::find(std::begin(endings), std::end(endings), found.extension()) == std::end(endings)) {
+      std::ranges::find(endings, found.extension()) == std::end(endings)) {
     return std::nullopt;
   }
   for (const fs::path& known : known_folders()) {
@@ -291,7 +289,7 @@ std::string preset_beside(const std::string& name, int step) {
   if (presets.empty()) {
     return "";
   }
-  const auto found = std::find(presets.begin(), presets.end(), in_any_case(name, presets));
+  const auto found = std::ranges::find(presets, in_any_case(name, presets));
   const int count = static_cast<int>(presets.size());
   const int at =
       found != presets.end() ? static_cast<int>(found - presets.begin()) : (step > 0 ? -1 : count);
@@ -341,7 +339,7 @@ Result<std::string> users_file(const std::string& name, const char* kind, const 
   constexpr std::size_t longest = 64;
   const bool is_name =
       !name.empty() && name.size() <= longest && name[0] != '.' && name[0] != ' ' &&
-      name.back() != ' ' && std::all_of(name.begin(), name.end(), [](char c) {
+      name.back() != ' ' && std::ranges::all_of(name, [](char c) {
         return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
                c == ' ' || c == '.' || c == '_' || c == '-';
       });

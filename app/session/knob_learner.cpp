@@ -13,7 +13,7 @@ using enum MidiNumber::Controller;
 bool is_knob(int controller) {
   constexpr int others[] = {0, 32, sustain_pedal, sostenuto_pedal, soft_pedal};
   return controller < MidiNumber::all_sound_off &&
-         std::find(std::begin(others), std::end(others), controller) == std::end(others);
+         std::ranges::find(others, controller) == std::end(others);
 }
 
 // An absolute knob sends every value once, an encoder the same few steps again and again. Without
@@ -28,7 +28,7 @@ ControllerMode mode_of(const std::vector<int>& values) {
   }
   using enum ControllerMode;
   for (const ControllerMode mode : {twos_complement, offset, sign_magnitude}) {
-    const bool is_possible = std::all_of(values.begin(), values.end(), [&](int value) {
+    const bool is_possible = std::ranges::all_of(values, [&](int value) {
       const int steps = std::abs(steps_of(mode, value));
       return steps >= 1 && steps <= most_steps;
     });
@@ -45,8 +45,7 @@ KnobLearner::Source& KnobLearner::source(ControllerSource kind, int number, int 
   const ControllerInput input{.source = kind,
                               .number = static_cast<std::uint16_t>(number),
                               .channel = static_cast<std::uint8_t>(channel)};
-  const auto known = std::find_if(sources_.begin(), sources_.end(),
-                                  [&](const Source& source) { return source.input == input; });
+  const auto known = std::ranges::find(sources_, input, &Source::input);
   return known != sources_.end() ? *known : sources_.emplace_back(Source{.input = input});
 }
 
@@ -100,8 +99,7 @@ std::optional<ControllerInput> KnobLearner::found() const {
     const auto count = [&](int number) {
       ControllerInput half = best->input;
       half.number = static_cast<std::uint16_t>(number);
-      const auto known = std::find_if(sources_.begin(), sources_.end(),
-                                      [&](const Source& next) { return next.input == half; });
+      const auto known = std::ranges::find(sources_, half, &Source::input);
       return known != sources_.end() ? known->values.size() : 0;
     };
     if (input.number < 2 * first_low_half &&

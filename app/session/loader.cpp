@@ -97,8 +97,7 @@ class SceneFiles {
 
  private:
   const SceneFile* find_given(const std::string& path) const {
-    const auto found = std::find_if(given_->begin(), given_->end(),
-                                    [&](const SceneFile& file) { return file.path == path; });
+    const auto found = std::ranges::find(*given_, path, &SceneFile::path);
     return found != given_->end() ? &*found : nullptr;
   }
 
@@ -448,7 +447,7 @@ class SceneReader {
     } catch (const Stopped&) {
       return failed<Scene>(finding_of("", "", Error{stopped}));
     }
-    if (std::find(knobs.begin(), knobs.end(), preset.morph_parameter) == knobs.end()) {
+    if (std::ranges::find(knobs, preset.morph_parameter) == knobs.end()) {
       scene.preset.parameters.push_back({.name = preset.morph_parameter,
                                          .value = 1.0,
                                          .minimum = 1.0,

@@ -15,20 +15,18 @@ namespace {
 // Returns true if another engine can continue the state of this plan's. Modes leave out inaudible
 // ones, so no other form can continue their state.
 bool can_be_continued(const Plan& plan) {
-  return std::none_of(plan.parts.begin(), plan.parts.end(),
-                      [](const Part& part) { return part.method == Method::modal; });
+  return std::ranges::none_of(plan.parts,
+                              [](const Part& part) { return part.method == Method::modal; });
 }
 
 // Returns true if a compilation with more modes may find a cheaper plan.
 bool may_gain(const Plan& plan) {
-  return can_be_continued(plan) && std::any_of(plan.parts.begin(), plan.parts.end(),
-                                               [](const Part& part) { return part.may_gain; });
+  return can_be_continued(plan) && std::ranges::any_of(plan.parts, &Part::may_gain);
 }
 
 // Returns true if forms that may be cheaper have not been measured.
 bool is_untimed(const Plan& plan) {
-  return std::any_of(plan.parts.begin(), plan.parts.end(),
-                     [](const Part& part) { return part.is_untimed; });
+  return std::ranges::any_of(plan.parts, &Part::is_untimed);
 }
 
 }  // namespace

@@ -47,10 +47,10 @@ constexpr std::chrono::milliseconds header_age{500};  // interval of header upda
 
 const Kind* kind_of(const std::string& path) {
   std::string ending = fs::path(path).extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
-  const auto found = std::find_if(std::begin(kinds), std::end(kinds),
-                                  [&](const Kind& kind) { return kind.ending == ending; });
+  std::ranges::transform(ending, ending.begin(), [](char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c;
+  });
+  const auto found = std::ranges::find(kinds, ending, &Kind::ending);
   return found == std::end(kinds) ? nullptr : &*found;
 }
 
@@ -61,8 +61,7 @@ bool may_be_replaced(const std::string& path) {
   file.read(first, sizeof first);
   const std::string_view mark(first, static_cast<std::size_t>(file.gcount()));
   return mark.empty() || mark == "RF64" ||
-         std::any_of(std::begin(kinds), std::end(kinds),
-                     [&](const Kind& kind) { return kind.mark == mark; });
+         std::ranges::any_of(kinds, [&](const Kind& kind) { return kind.mark == mark; });
 }
 
 int samples_of(SampleFormat format) {

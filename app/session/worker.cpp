@@ -275,9 +275,7 @@ Result<std::string> Worker::apply_edit(Draft draft) {
   if (const std::optional<Scene>& before = watch_.as_read()) {
     const std::vector<Setting> starts = start_settings(*before);
     for (const Setting& start : start_settings(draft.scene)) {
-      const auto was = std::find_if(starts.begin(), starts.end(), [&](const Setting& setting) {
-        return setting.parameter == start.parameter;
-      });
+      const auto was = std::ranges::find(starts, start.parameter, &Setting::parameter);
       if (was != starts.end() && was->value != start.value) {
         changed.push_back(start);
       } else if (was != starts.end()) {  // keep what a player has changed

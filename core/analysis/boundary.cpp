@@ -16,10 +16,9 @@ constexpr double rounding = 1e-9;
 
 bool is_usable(const Weights& weights) {
   const auto finite = [](double w) { return std::isfinite(w); };
-  return !weights.gains_energy &&
-         std::all_of(weights.masses.begin(), weights.masses.end(),
-                     [](double m) { return m > 0.0 && std::isfinite(m); }) &&
-         std::all_of(weights.terms.begin(), weights.terms.end(), finite);
+  return !weights.gains_energy && std::ranges::all_of(weights.masses, [](double m) {
+    return m > 0.0 && std::isfinite(m);
+  }) && std::ranges::all_of(weights.terms, finite);
 }
 
 std::vector<double> diagonal(const Weights& weights, double limit) {
@@ -101,7 +100,7 @@ bool BoundaryFinder::factors(const Weights& weights, double limit) {
       rest[entry.row] -= weights.terms[t] * entry.share * entry.share;
     }
   }
-  if (std::all_of(rest.begin(), rest.end(), [](double d) { return d > 0.0; }) && is_exact() &&
+  if (std::ranges::all_of(rest, [](double d) { return d > 0.0; }) && is_exact() &&
       definite_.factor(diagonal, weights.terms)) {
     return true;
   }

@@ -57,8 +57,8 @@ std::optional<std::vector<double>> compliances(const Network& network, const Par
                                                double rate_ratio,
                                                std::span<const std::uint32_t> masses,
                                                const Progress& progress) {
-  const auto moving = std::count_if(network.masses.begin(), network.masses.end(),
-                                    [](const Mass& mass) { return moves(mass); });
+  const auto moving =
+      std::ranges::count_if(network.masses, [](const Mass& mass) { return moves(mass); });
   if (static_cast<std::size_t>(moving) > most_compliant_masses) {
     return std::nullopt;
   }

@@ -70,7 +70,7 @@ class ContinuousBody {
 
   std::size_t size() const { return root_.size(); }
   bool has_mass() const {
-    return !root_.empty() && std::all_of(root_.begin(), root_.end(), [](double root) {
+    return !root_.empty() && std::ranges::all_of(root_, [](double root) {
       return root > 0.0 && std::isfinite(root);
     });
   }
@@ -327,8 +327,9 @@ std::optional<std::vector<ContinuousOutput>> solve_continuous(const Network& net
   }
   const ContinuousBody body(network, parameters);
   if (!is_linear(network) || !body.has_mass() || body.size() > most_exact_modes ||
-      std::any_of(network.outputs.begin(), network.outputs.end(),
-                  [](const Output& output) { return output.is_force || output.derivative > 0; })) {
+      std::ranges::any_of(network.outputs, [](const Output& output) {
+        return output.is_force || output.derivative > 0;
+      })) {
     return std::nullopt;
   }
   return Solver(network, body).solve();

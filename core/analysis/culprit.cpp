@@ -60,7 +60,7 @@ std::optional<Stability::Suspect> Stability::find_invalid_number_in(
 
 Stability::Suspect Stability::feeder(std::span<const Range> arguments) {
   const std::span<const Load> all = lowest_loads(arguments);
-  const auto least = std::min_element(all.begin(), all.end(), [](const Load& a, const Load& b) {
+  const auto least = std::ranges::min_element(all, [](const Load& a, const Load& b) {
     return std::min(a.stiff, a.damped) < std::min(b.stiff, b.damped);
   });
   return {least->stiff < least->damped ? Quantity::stiffness : Quantity::damping,

@@ -293,8 +293,8 @@ std::optional<Lowest> lowest_pairs(Spectrum& spectrum, const SparseMatrix& lower
     if (!pairs) {
       continue;
     }
-    const auto above = std::find_if(std::begin(pairs->values), std::end(pairs->values),
-                                    [&](double value) { return value > floor; });
+    const auto above =
+        std::ranges::find_if(pairs->values, [&](double value) { return value > floor; });
     if (above != std::end(pairs->values)) {
       const auto first = static_cast<std::size_t>(above - std::begin(pairs->values));
       return is_pair(lower, pairs->values[first], pairs->vectors.column(first),
@@ -355,8 +355,8 @@ std::vector<Vector> shapes_of(const Body& body, const Lowest& lowest, Spectrum& 
 // Returns the network with all fixed elements held in place; the rest has the mode that keys tune.
 // Empty if nothing is fixed.
 std::optional<Network> fixed_held(const Network& network) {
-  if (std::none_of(network.masses.begin(), network.masses.end(),
-                   [](const Mass& mass) { return mass.is_fixed && moves(mass); })) {
+  if (std::ranges::none_of(network.masses,
+                           [](const Mass& mass) { return mass.is_fixed && moves(mass); })) {
     return std::nullopt;
   }
   Network held = network;

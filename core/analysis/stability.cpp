@@ -66,7 +66,7 @@ std::span<const Range> Stability::ranges(const ParameterBox& box) {
   ranges_.resize(network_.arguments.size());
   for (std::size_t i = 0; i < ranges_.size(); ++i) {
     const Formula& formula = network_.arguments[i];
-    if (is_first || std::any_of(formula.begin(), formula.end(), [&](const Step& step) {
+    if (is_first || std::ranges::any_of(formula, [&](const Step& step) {
           return step.op == Op::parameter && has_moved[step.index];
         })) {
       ranges_[i] = formula_range(formula, box);
@@ -92,7 +92,7 @@ std::span<const Load> Stability::update(LastLoads& last, std::span<const Range> 
     bool is_new = is_first;
     if (term.is_link) {
       const auto& used = network_.links[term.element].arguments;
-      is_new = is_new || std::any_of(used.begin(), used.end(), moves);
+      is_new = is_new || std::ranges::any_of(used, moves);
     } else {
       const Mass& mass = network_.masses[term.element];
       is_new = is_new || moves(mass.mass) || moves(mass.stiffness) || moves(mass.damping);
@@ -139,8 +139,7 @@ Weights Stability::weights_for(std::span<const Range> arguments, const RangeOver
 // Single terms may be negative as long as their sum is not: a spring that pushes beside one that
 // pulls. A link on a waveguide is not part of a sum.
 bool Stability::gains_energy(std::span<const Range> arguments) {
-  if (std::none_of(arguments.begin(), arguments.end(),
-                   [](const Range& range) { return range.lowest < 0.0; })) {
+  if (std::ranges::none_of(arguments, [](const Range& range) { return range.lowest < 0.0; })) {
     return false;
   }
   std::vector<double> stiff;
@@ -199,7 +198,7 @@ Stability::Course Stability::course_along(std::size_t parameter) const {
     if (!is_affine(formula, index)) {
       return Course::bent;
     }
-    if (std::any_of(formula.begin(), formula.end(), [&](const Step& step) {
+    if (std::ranges::any_of(formula, [&](const Step& step) {
           return step.op == Op::parameter && step.index == index;
         })) {
       course = Course::straight;
@@ -286,7 +285,7 @@ std::optional<SafeRange> Stability::safe_range_beside(const ParameterBox& box,
   for (double far = 16.0; course != Course::flat && far < 1e8; far *= 16.0) {
     tries.insert(tries.end(), {(size > 0.0 ? size : 1.0) * far, size / far});
   }
-  const auto anchor = std::find_if(tries.begin(), tries.end(), holds);
+  const auto anchor = std::ranges::find_if(tries, holds);
   if (anchor == tries.end()) {
     return std::nullopt;
   }

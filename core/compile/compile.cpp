@@ -69,9 +69,8 @@ double wanted_factor(const CompileRequest& request, const Mode& mode, double sta
 Planned plan(const CompileRequest& request, const Analysis& analysis, const Proof& proof,
              Machine machine) {
   const CompileOptions& options = request.options;
-  const bool has_waveguides =
-      std::any_of(machine.parts.begin(), machine.parts.end(),
-                  [](const Program& program) { return !program.waveguides.empty(); });
+  const bool has_waveguides = std::ranges::any_of(
+      machine.parts, [](const Program& program) { return !program.waveguides.empty(); });
   options.progress.stage("finding the fastest way to compute it");
   const double stable = analysis.shapes ? std::max(1.0, proof.margins.keys) : 1.0;
   const bool may_reach =
@@ -193,8 +192,8 @@ Result<Compiled> compile_by_stages(const CompileRequest& request) {
   Machine machine = tabulate(network, culled, schemes.links, analysis->values, options.rate_hz,
                              options.rescale, progress);
 
-  const auto parts = std::count_if(machine.parts.begin(), machine.parts.end(),
-                                   [](const Program& program) { return program.moving > 0; });
+  const auto parts = std::ranges::count_if(
+      machine.parts, [](const Program& program) { return program.moving > 0; });
   auto body = compile_body(request, network, analysis->start, static_cast<std::size_t>(parts));
   if (!body) {
     return body.error();

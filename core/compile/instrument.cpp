@@ -34,7 +34,7 @@ GestureSettings settings_of(const ControlSetting& setting) {
 // Returns whether an input pushes a mass that no spring brings back.
 bool is_thrown(const Network& network, const Input& input) {
   return input.is_force && network.masses[input.mass].kind == MassKind::mass &&
-         std::none_of(network.links.begin(), network.links.end(), [&](const Link& link) {
+         std::ranges::none_of(network.links, [&](const Link& link) {
            return (link.a == input.mass || link.b == input.mass) &&
                   linear_part(link).stiffness != no_argument;
          });
@@ -170,7 +170,7 @@ std::string coordinate_text(double value) {
 std::string struck_name(const Network& network, std::uint32_t mass) {
   if (mass >= network.masses.size()) {
     const std::vector<std::uint32_t> starts = macro_starts(network);
-    const auto macro = std::upper_bound(starts.begin(), starts.end(), mass) - starts.begin() - 1;
+    const auto macro = std::ranges::upper_bound(starts, mass) - starts.begin() - 1;
     return network.macros[static_cast<std::size_t>(macro)].name + ":" +
            std::to_string(mass - starts[static_cast<std::size_t>(macro)] + 1);
   }
@@ -225,7 +225,7 @@ std::vector<StruckInfo> find_struck(const Network& network, const Machine& machi
     }
   }
   const auto is_before = [](const StruckInfo& a, const StruckInfo& b) { return a.name < b.name; };
-  std::stable_sort(struck.begin(), struck.end(), is_before);
+  std::ranges::stable_sort(struck, is_before);
   // Several links may end at one place.
   const auto same = [](const StruckInfo& a, const StruckInfo& b) { return a.name == b.name; };
   struck.erase(std::unique(struck.begin(), struck.end(), same), struck.end());
@@ -233,8 +233,7 @@ std::vector<StruckInfo> find_struck(const Network& network, const Machine& machi
 }
 
 bool has_swings(const Preset& preset) {
-  return std::any_of(preset.controls.begin(), preset.controls.end(),
-                     [](const ControlSetting& control) { return control.in_swings; });
+  return std::ranges::any_of(preset.controls, &ControlSetting::in_swings);
 }
 
 Preset without_swings(Preset preset) {

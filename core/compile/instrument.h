@@ -26,7 +26,7 @@ struct InputInfo {
   std::vector<Gesture> gestures;  // gestures of the preset's controls
   std::string attached_to;        // name of the mass that it moves or pushes
   bool knows(Gesture gesture) const {
-    return std::find(gestures.begin(), gestures.end(), gesture) != gestures.end();
+    return std::ranges::find(gestures, gesture) != gestures.end();
   }
 };
 

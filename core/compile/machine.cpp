@@ -64,7 +64,7 @@ class ProgramMaker {
                             program_.depending[i].end());
       }
     }
-    std::sort(program_.audio_coefficients.begin(), program_.audio_coefficients.end());
+    std::ranges::sort(program_.audio_coefficients);
     program_.audio_coefficients.erase(
         std::unique(program_.audio_coefficients.begin(), program_.audio_coefficients.end()),
         program_.audio_coefficients.end());
@@ -126,8 +126,7 @@ class ProgramMaker {
 
   // Returns how often a formula reads parameters.
   static std::ptrdiff_t reads_of(const Formula& formula) {
-    return std::count_if(formula.begin(), formula.end(),
-                         [](const Step& step) { return step.op == Op::parameter; });
+    return std::ranges::count(formula, Op::parameter, &Step::op);
   }
 
   // Returns whether a mode rings at a frequency that no parameter changes. Both M (w^2 + s^2) and
@@ -185,8 +184,7 @@ class ProgramMaker {
       return std::tuple(group, m.is_mode, m.is_fixed, m.kind, m.mass, m.stiffness, m.damping,
                         m.gravity, m.gravity_per_rate);
     };
-    std::stable_sort(order.begin(), order.end(),
-                     [&](std::uint32_t a, std::uint32_t b) { return rank(a) < rank(b); });
+    std::ranges::stable_sort(order, {}, rank);
     program_.masses = order;
     node_.resize(masses.size(), nowhere);
     program_.position.reserve(order.size());
@@ -280,8 +278,7 @@ class ProgramMaker {
       const Link& link = network_.links[i];
       return std::tuple(link.law, link.arguments, link.is_fixed, scheme_of(i));
     };
-    std::stable_sort(order.begin(), order.end(),
-                     [&](std::uint32_t a, std::uint32_t b) { return rank(a) < rank(b); });
+    std::ranges::stable_sort(order, {}, rank);
     program_.ends.reserve(order.size());
     program_.origins = order;
     for (std::uint32_t i = 0; i < order.size(); ++i) {
@@ -393,7 +390,7 @@ class Divider {
           }
         }
       }
-      std::sort(shares[part].masses.begin(), shares[part].masses.end());
+      std::ranges::sort(shares[part].masses);
     }
     return shares;
   }
@@ -412,8 +409,8 @@ class Divider {
         roots.push_back(groups_.find(i));
       }
     }
-    std::stable_sort(roots.begin(), roots.end(),
-                     [&](std::uint32_t a, std::uint32_t b) { return count[a] > count[b]; });
+    std::ranges::stable_sort(roots,
+                             [&](std::uint32_t a, std::uint32_t b) { return count[a] > count[b]; });
     part_.assign(binds_.size(), nowhere);
     for (const std::uint32_t root : roots) {
       if (parts_ < most_parts && count[root] >= least_part_masses) {

@@ -34,9 +34,8 @@ bool has_free_modes(const Program& program) {
   const auto is_free = [&](const MassRun& run) {
     return !run.is_oscillator || program.coefficients[run.stiffness].mode != no_mode;
   };
-  return !program.modes.empty() &&
-         std::all_of(program.mass_runs.begin(), program.mass_runs.end(), is_free) &&
-         std::all_of(program.link_runs.begin(), program.link_runs.end(), [](const LinkRun& run) {
+  return !program.modes.empty() && std::ranges::all_of(program.mass_runs, is_free) &&
+         std::ranges::all_of(program.link_runs, [](const LinkRun& run) {
            return run.scheme == Scheme::discrete_gradient && !is_linear(run.law);
          });
 }
@@ -304,9 +303,7 @@ class Chooser {
   // Replaces the first in rank by the form of an earlier plan, or by a form that is measured to be
   // clearly cheaper.
   void apply_measurements() {
-    const auto recorded =
-        std::find_if(candidates_.begin(), candidates_.end(),
-                     [&](const Candidate& candidate) { return candidate.name == recorded_; });
+    const auto recorded = std::ranges::find(candidates_, recorded_, &Candidate::name);
     if (recorded != candidates_.end()) {
       best_ = static_cast<std::size_t>(recorded - candidates_.begin());
       return;

@@ -97,7 +97,7 @@ Schemes choose_schemes(const Network& network, const Budget& budget, const Progr
 
 Network without_passive(const Network& network, std::span<const LinkScheme> schemes) {
   const auto is_plain = [](const LinkScheme& link) { return link.scheme == Scheme::plain; };
-  if (std::all_of(schemes.begin(), schemes.end(), is_plain)) {
+  if (std::ranges::all_of(schemes, is_plain)) {
     return network;
   }
   const std::vector<double> values = parameter_values(network);

@@ -246,7 +246,7 @@ class StabilityChecker {
   void keep_positive(ArgumentId argument, std::size_t i) {
     const Formula& formula = request_.expanded.arguments[argument];
     const auto uses = [&](const Step& step) { return step.op == Op::parameter && step.index == i; };
-    if (std::none_of(formula.begin(), formula.end(), uses)) {
+    if (std::ranges::none_of(formula, uses)) {
       return;
     }
     keep(i, [&](const ParameterBox& box) { return formula_range(formula, box).lowest >= 0.0; });
@@ -478,9 +478,7 @@ std::vector<double> start_values(const std::vector<ParameterInfo>& parameters,
 ParameterBox preset_box(const std::vector<ParameterInfo>& parameters, const Preset& preset) {
   ParameterBox box;
   for (const ParameterInfo& info : parameters) {
-    const auto given =
-        std::find_if(preset.parameters.begin(), preset.parameters.end(),
-                     [&](const ParameterSetting& setting) { return setting.name == info.name; });
+    const auto given = std::ranges::find(preset.parameters, info.name, &ParameterSetting::name);
     const bool is_given = given != preset.parameters.end();
     box.lowest.push_back(is_given ? given->minimum : info.value);
     box.highest.push_back(is_given ? given->maximum : info.value);

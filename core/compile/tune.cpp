@@ -157,8 +157,8 @@ std::vector<Pitches> find_key_pitches(const CompileRequest& request, const Netwo
                                       const Machine& machine, const LowestShapes& shared_shapes,
                                       const Pitches& shared,
                                       const std::vector<std::optional<VoiceCurve>>& curves) {
-  if (std::none_of(curves.begin(), curves.end(),
-                   [](const auto& curve) { return curve && !curve->keys.empty(); })) {
+  if (std::ranges::none_of(curves,
+                           [](const auto& curve) { return curve && !curve->keys.empty(); })) {
     return {};
   }
   request.options.progress.stage("tuning each key at its own parameters");

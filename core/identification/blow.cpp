@@ -66,8 +66,7 @@ std::size_t find_onset(const std::vector<double>& loudness, double peak, double 
 std::size_t find_loudest_blow(const std::vector<double>& loudness, std::size_t first,
                               double rate_hz) {
   const auto hop = static_cast<std::size_t>(hop_s * rate_hz);
-  const auto peak = static_cast<std::size_t>(std::max_element(loudness.begin(), loudness.end()) -
-                                             loudness.begin());
+  const auto peak = static_cast<std::size_t>(std::ranges::max_element(loudness) - loudness.begin());
   std::vector<double> levels;  // the largest magnitude of each hop and the next one
   for (std::size_t at = first; at + 2 * hop <= loudness.size() && at <= peak; at += hop) {
     const auto begin = loudness.begin() + static_cast<std::ptrdiff_t>(at);
@@ -171,7 +170,7 @@ Result<Blow> find_blow(const Recording& recording, bool skips_clipped) {
     means.push_back(sum / static_cast<double>(frames));
   }
   const std::vector<double> loudness = magnitudes(recording, means);
-  const double peak = *std::max_element(loudness.begin(), loudness.end());
+  const double peak = *std::ranges::max_element(loudness);
   if (!(peak > 1e-12 * largest) || peak < 1e-30) {
     return Error{"it is silent: every sample is the same"};
   }

@@ -29,9 +29,8 @@ struct Ordered {
   explicit Ordered(std::span<const Complex> log_z)
       : order(log_z.size()), powers(block_frames * padded(2 * log_z.size())) {
     std::iota(order.begin(), order.end(), 0);
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-      return log_z[a].real() > log_z[b].real();
-    });
+    std::ranges::stable_sort(
+        order, [&](std::size_t a, std::size_t b) { return log_z[a].real() > log_z[b].real(); });
     for (std::size_t i = 0; i < order.size(); ++i) {
       double* const re = &powers[2 * i * block_frames];
       double* const im = re + block_frames;
@@ -49,7 +48,7 @@ struct Ordered {
   }
   // Returns the number of modes that ring at this sample.
   std::size_t ringing_at(std::size_t sample, std::span<const Complex> log_z) const {
-    const auto last = std::partition_point(order.begin(), order.end(), [&](std::size_t k) {
+    const auto last = std::ranges::partition_point(order, [&](std::size_t k) {
       return -log_z[k].real() * static_cast<double>(sample) <= gone;
     });
     return static_cast<std::size_t>(last - order.begin());

@@ -345,11 +345,9 @@ void DampedFit::refine(int steps, double settled, const Progress& progress) {
         for (std::size_t k = 0; k < count; ++k) {
           modes_[k].log_z = before[k].log_z + Complex((*step)(2 * k, 0), (*step)(2 * k + 1, 0));
         }
-        const bool is_sound =
-            std::all_of(modes_.begin(), modes_.end(), [&](const DampedMode& mode) {
-              return mode.log_z.real() * static_cast<double>(frames) < 1.0 &&
-                     mode.log_z.real() > -3.0;
-            });
+        const bool is_sound = std::ranges::all_of(modes_, [&](const DampedMode& mode) {
+          return mode.log_z.real() * static_cast<double>(frames) < 1.0 && mode.log_z.real() > -3.0;
+        });
         if (is_sound) {
           find_rest();
           is_better = rest_energy() < energy;

@@ -71,7 +71,7 @@ class Noise {
     const Power& power = power_of(-log_z.real());
     const double freedoms = static_cast<double>(power.frames() * channels_) / std::numbers::pi;
     const double half_width = std::max(least_freedoms / (2.0 * freedoms), 0.1 * log_z.imag());
-    const auto near = std::count_if(modes.begin(), modes.end(), [&](const DampedMode& mode) {
+    const auto near = std::ranges::count_if(modes, [&](const DampedMode& mode) {
       return std::fabs(mode.log_z.imag() - log_z.imag()) < half_width;
     });
     const double all = 2.0 * half_width * freedoms;
@@ -253,7 +253,7 @@ class Search {
   // holds. The poles stay. Returns the number of removed modes.
   std::size_t keep_best(std::size_t count, std::vector<bool> is_kept) {
     is_kept.resize(fit_.modes().size());
-    auto left = static_cast<std::size_t>(std::count(is_kept.begin(), is_kept.end(), false));
+    auto left = static_cast<std::size_t>(std::ranges::count(is_kept, false));
     return fit_.eliminate([&](const std::vector<double>& drops) {
       std::size_t least = drops.size();
       for (std::size_t k = 0; k < drops.size() && left > count; ++k) {
@@ -317,8 +317,7 @@ class Search {
       }
       progress_.spend(channel.size() * poles.size() / 4);
     }
-    std::sort(ranked.begin(), ranked.end(),
-              [](const Ranked& a, const Ranked& b) { return a.explained > b.explained; });
+    std::ranges::sort(ranked, std::ranges::greater(), &Ranked::explained);
     return ranked;
   }
 
@@ -346,8 +345,7 @@ class Search {
       const auto is_near = [z = log_z](Complex other) {
         return std::fabs(other.imag() - z.imag()) < 2.0 * std::max(-other.real(), -z.real());
       };
-      if (explained > much * ranked[0].explained &&
-          std::none_of(best.begin(), best.end(), is_near)) {
+      if (explained > much * ranked[0].explained && std::ranges::none_of(best, is_near)) {
         best.push_back(log_z);
       }
     }
@@ -359,8 +357,8 @@ class Search {
     for (double share = twin; share < 20.0; share *= 4.0) {
       std::vector<Complex> all = known;
       for (const Complex log_z : found) {
-        if (std::none_of(all.begin(), all.end(),
-                         [&](Complex other) { return are_twins(log_z, other, share, frames()); })) {
+        if (std::ranges::none_of(
+                all, [&](Complex other) { return are_twins(log_z, other, share, frames()); })) {
           all.push_back(log_z);
         }
       }
@@ -384,7 +382,7 @@ class Search {
         uncertain.emplace_back(certain, k);
       }
     }
-    std::sort(uncertain.begin(), uncertain.end());
+    std::ranges::sort(uncertain);
     std::vector<bool> is_dropped(modes.size());
     std::size_t left = modes.size();
     for (const auto& row : uncertain) {
@@ -430,8 +428,7 @@ class Search {
       }
       if (left > most_) {
         --left;
-        return static_cast<std::size_t>(std::min_element(drops.begin(), drops.end()) -
-                                        drops.begin());
+        return static_cast<std::size_t>(std::ranges::min_element(drops) - drops.begin());
       }
       double most = 0.0;
       for (const double drop : drops) {
@@ -443,9 +440,9 @@ class Search {
       for (std::size_t k = 0; k < drops.size(); ++k) {
         // A peak that is not exactly a damped sinusoid leaves a large residual around it, but it is
         // still a peak. Any other mode near it must exceed that residual.
-        const bool is_peak =
-            std::none_of(neighbours[k].begin(), neighbours[k].end(),
-                         [&](std::size_t j) { return drops[j] > drops[k] && drops[j] < HUGE_VAL; });
+        const bool is_peak = std::ranges::none_of(neighbours[k], [&](std::size_t j) {
+          return drops[j] > drops[k] && drops[j] < HUGE_VAL;
+        });
         const double likelihood =
             drops[k] < least_drop ? 0.0 : 0.5 * drops[k] / (is_peak ? floor[k] : variance[k]);
         if (!(likelihood >= least) && drops[k] < HUGE_VAL) {
@@ -599,8 +596,8 @@ void extrapolate_back(Found& found, double samples) {
 // mode had decayed before the first analysed sample, and what was fitted is rounding error.
 bool is_too_loud(const Found& found, double peak) {
   constexpr double much_more = 30.0;
-  return std::any_of(found.mode.c.begin(), found.mode.c.end(),
-                     [&](Complex c) { return std::abs(c) > much_more * peak; });
+  return std::ranges::any_of(found.mode.c,
+                             [&](Complex c) { return std::abs(c) > much_more * peak; });
 }
 
 Fate fate_of(const Found& found, double rate_hz, std::size_t frames, bool must_be_known) {
@@ -832,7 +829,7 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
       const std::vector<DampedMode> best = search->fit().modes();
       search->refit();
       const std::vector<Fate> all = fates(false);
-      if (std::find(all.begin(), all.end(), Fate::unfit) != all.end()) {
+      if (std::ranges::find(all, Fate::unfit) != all.end()) {
         search->fit().set_modes(best);
       }
     }
@@ -874,7 +871,7 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
       }
     }
   }
-  std::sort(kept.begin(), kept.end(), [&](const Found& a, const Found& b) {
+  std::ranges::sort(kept, [&](const Found& a, const Found& b) {
     return energy_of(a.mode, frames) > energy_of(b.mode, frames);
   });
   std::size_t count = 0;
@@ -893,13 +890,13 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
   // The modes of noise are uncertain and explain little of it.
   const double rest_now = search->fit().rest_energy() / std::max(energy_in(made.sound), 1e-300);
   const bool rings = options.least_modes > 0 || rest_now < most_of_noise ||
-                     std::any_of(kept.begin(), kept.end(), [&](const Found& found) {
+                     std::ranges::any_of(kept, [&](const Found& found) {
                        return certainty(found.mode, found.deviation, 1.0) >= 2.0 * chance;
                      });
   if (kept.empty() || !rings) {
     return Error{"nothing in it rings: no decaying tone stands above its noise"};
   }
-  std::sort(kept.begin(), kept.end(), [](const Found& a, const Found& b) {
+  std::ranges::sort(kept, [](const Found& a, const Found& b) {
     return a.mode.log_z.imag() < b.mode.log_z.imag();
   });
   const double time_zero = time_of_impulse(kept, rate_hz);

@@ -91,8 +91,7 @@ std::vector<NoiseBand> noise_bands(const Identification& found) {
       }
       of_channel.push_back(sum);
     }
-    const auto loudest =
-        static_cast<std::size_t>(std::max_element(all.begin(), all.end()) - all.begin());
+    const auto loudest = static_cast<std::size_t>(std::ranges::max_element(all) - all.begin());
     double energy = 0.0;
     double moment = 0.0;
     double whole = 0.0;

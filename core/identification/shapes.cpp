@@ -29,7 +29,7 @@ std::vector<BodyShape> body_shapes(const std::vector<IdentifiedMode>& modes, dou
     moved.push_back(std::sqrt(square));
     shapes.push_back(std::move(shape));
   }
-  const double most = moved.empty() ? 1.0 : *std::max_element(moved.begin(), moved.end());
+  const double most = moved.empty() ? 1.0 : *std::ranges::max_element(moved);
   for (std::size_t k = 0; k < shapes.size(); ++k) {
     shapes[k].hit = std::sqrt(moved[k] / most);
     for (auto* const heard : {&shapes[k].heard, &shapes[k].position, &shapes[k].velocity}) {

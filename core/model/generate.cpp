@@ -229,8 +229,7 @@ class Builder {
     if (shape_.with_io) {
       const std::uint32_t in = nearest(layout, input_spot, no_point);
       const std::uint32_t out = nearest(layout, output_spot, in);
-      if (std::none_of(layout.points.begin(), layout.points.end(),
-                       [](const Point& point) { return point.is_fixed; })) {
+      if (std::ranges::none_of(layout.points, &Point::is_fixed)) {
         hold(0);
       }
       connect(in, out == no_point ? in : out);
@@ -421,8 +420,7 @@ Result<Network> generate(const Shape& shape) {
     return Builder(shape).macro(*macro);
   }
   const Layout layout = layout_of(shape);
-  if (std::all_of(layout.points.begin(), layout.points.end(),
-                  [](const Point& point) { return point.is_fixed; })) {
+  if (std::ranges::all_of(layout.points, &Point::is_fixed)) {
     return Error{"all points of this shape are fixed: choose a larger size"};
   }
   return Builder(shape).points(layout);

@@ -144,7 +144,7 @@ class Morphing {
            std::span<const std::string> knobs)
       : stops_(stops), out_(base) {
     const auto is_kept = [&](const Parameter& one) {
-      return one.audio_input > 0 || std::find(knobs.begin(), knobs.end(), one.name) != knobs.end();
+      return one.audio_input > 0 || std::ranges::find(knobs, one.name) != knobs.end();
     };
     std::erase_if(out_.parameters, [&](const Parameter& one) { return !is_kept(one); });
     out_.parameters.push_back({.name = parameter, .value = 1.0});
@@ -170,8 +170,8 @@ class Morphing {
       id = is_there ? add(between(formulas, is_place)) : no_argument;
       ++at;
     });
-    const bool has_gains = std::any_of(stops_.begin(), stops_.end(),
-                                       [](const MorphStop& stop) { return stop.gain != 1.0; });
+    const bool has_gains =
+        std::ranges::any_of(stops_, [](const MorphStop& stop) { return stop.gain != 1.0; });
     for (std::size_t o = 0; o < out_.outputs.size(); ++o) {
       std::vector<Formula> formulas;
       bool has_level = has_gains;
@@ -236,9 +236,8 @@ class Morphing {
       }
       driven = is_on_body(input.mass) ? std::optional(input.mass) : driven;
     }
-    const bool has_links = std::any_of(out_.links.begin(), out_.links.end(), [&](const Link& link) {
-      return is_on_body(link.a) || is_on_body(link.b);
-    });
+    const bool has_links = std::ranges::any_of(
+        out_.links, [&](const Link& link) { return is_on_body(link.a) || is_on_body(link.b); });
     if (!driven || has_links) {
       return refuse(has_links ? "links are attached to it" : "no input drives it");
     }
@@ -343,8 +342,7 @@ class Morphing {
         continue;
       }
       const std::string& name = stops_[s].network->parameters[step.index].name;
-      const auto knob = std::find_if(out_.parameters.begin(), out_.parameters.end(),
-                                     [&](const Parameter& one) { return one.name == name; });
+      const auto knob = std::ranges::find(out_.parameters, name, &Parameter::name);
       step = knob == out_.parameters.end()
                  ? Step{Op::number, 0, stops_[s].values[step.index]}
                  : Step{Op::parameter, static_cast<std::uint32_t>(knob - out_.parameters.begin())};
@@ -353,10 +351,9 @@ class Morphing {
   }
 
   Formula between(const std::vector<Formula>& formulas, bool is_place) const {
-    const bool by_ratios =
-        !is_place && std::all_of(formulas.begin(), formulas.end(), [&](const Formula& formula) {
-          return evaluate(formula, values_) > 0.0;
-        });
+    const bool by_ratios = !is_place && std::ranges::all_of(formulas, [&](const Formula& formula) {
+      return evaluate(formula, values_) > 0.0;
+    });
     Formula all = formulas.front();
     for (std::size_t s = 1; s < formulas.size(); ++s) {
       if (formulas[s] == formulas[s - 1]) {
@@ -409,9 +406,9 @@ Result<Network> morphed(const Network& base, std::span<const MorphStop> stops,
       return *std::move(error);
     }
     for (const Parameter& one : stop.network->parameters) {
-      if (one.audio_input > 0 &&
-          std::none_of(base.parameters.begin(), base.parameters.end(),
-                       [&](const Parameter& other) { return other.name == one.name; })) {
+      if (one.audio_input > 0 && std::ranges::none_of(base.parameters, [&](const Parameter& other) {
+            return other.name == one.name;
+          })) {
         return Error{"an audio input sets the parameter " + quoted(one.name) + " of " + stop.name +
                      ", which the model of the morph does not have"};
       }

@@ -40,8 +40,8 @@ class Renumbering {
 
   Network run() {
     const auto by_number = [](const auto& a, const auto& b) { return a.number < b.number; };
-    std::stable_sort(old_.inputs.begin(), old_.inputs.end(), by_number);
-    std::stable_sort(old_.outputs.begin(), old_.outputs.end(), by_number);
+    std::ranges::stable_sort(old_.inputs, by_number);
+    std::ranges::stable_sort(old_.outputs, by_number);
     new_.parameters = std::move(old_.parameters);
     new_.third = old_.third;
     place_masses();
@@ -52,7 +52,7 @@ class Renumbering {
       macro.drawing = drawing(macro.drawing);
     }
     new_.macros = std::move(old_.macros);
-    std::stable_sort(old_.modes.begin(), old_.modes.end(), by_body);
+    std::ranges::stable_sort(old_.modes, by_body);
     for (BodyMode& mode : old_.modes) {
       mode.frequency_hz = argument(mode.frequency_hz);
       mode.t60_s = argument(mode.t60_s);
@@ -219,14 +219,13 @@ bool rests_at_zero(const Network& network) {
   const auto rests = [](const auto& element) {
     return element.position == 0.0 && element.third == 0.0;
   };
-  return std::all_of(network.masses.begin(), network.masses.end(),
-                     [&](const Mass& mass) { return !moves(mass) || rests(mass); }) &&
-         std::all_of(network.macros.begin(), network.macros.end(), rests);
+  return std::ranges::all_of(network.masses,
+                             [&](const Mass& mass) { return !moves(mass) || rests(mass); }) &&
+         std::ranges::all_of(network.macros, rests);
 }
 
 std::size_t moving_count(const Network& network) {
-  return static_cast<std::size_t>(
-      std::count_if(network.masses.begin(), network.masses.end(), moves));
+  return static_cast<std::size_t>(std::ranges::count_if(network.masses, moves));
 }
 
 int input_count(const Network& network) {

@@ -19,7 +19,7 @@ class NumberCheck {
       : network_(network), parameters_(parameters), grown_(std::max(1.0, rate_ratio * rate_ratio)) {
     for (const Formula& formula : network.arguments) {
       const double value = evaluate(formula, parameters);
-      const bool is_live = std::any_of(formula.begin(), formula.end(), [&](const Step& step) {
+      const bool is_live = std::ranges::any_of(formula, [&](const Step& step) {
         return step.op == Op::parameter && network.parameters[step.index].audio_input > 0;
       });
       is_wrong_.push_back(!is_live && !std::isfinite(grown_ * value));
@@ -159,7 +159,7 @@ class NumberCheck {
     }
     std::string values;
     for (std::size_t i = 0; i < names.size(); ++i) {
-      if (std::any_of(formula.begin(), formula.end(), [&](const Step& step) {
+      if (std::ranges::any_of(formula, [&](const Step& step) {
             return step.op == Op::parameter && step.index == i;
           })) {
         values +=

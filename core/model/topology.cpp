@@ -370,9 +370,9 @@ bool is_on_waveguide(const Network& network, std::uint32_t mass) {
 }
 
 bool has_waveguide(const Network& network) {
-  return !network.waveguides.empty() ||
-         std::any_of(network.macros.begin(), network.macros.end(),
-                     [](const Macro& macro) { return is_waveguide(macro.kind); });
+  return !network.waveguides.empty() || std::ranges::any_of(network.macros, [](const Macro& macro) {
+    return is_waveguide(macro.kind);
+  });
 }
 
 bool consists_of_modes(MacroKind kind) {

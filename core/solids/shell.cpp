@@ -56,8 +56,8 @@ class Halver {
       Triangle other = half;
       std::replace(half.begin(), half.end(), high, middle);
       std::replace(other.begin(), other.end(), low, middle);
-      const int apex = *std::find_if(half.begin(), half.end(),
-                                     [&](int corner) { return corner != low && corner != middle; });
+      const int apex = *std::ranges::find_if(
+          half, [&](int corner) { return corner != low && corner != middle; });
       const int added = static_cast<int>(surface_.triangles.size());
       surface_.triangles.push_back(other);
       std::vector<int>& side = triangles_.at(std::minmax(high, apex));

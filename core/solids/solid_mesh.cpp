@@ -87,11 +87,11 @@ Result<SolidMesh> quadratic(const TetrahedronMesh& mesh) {
     for (const auto& face : faces) {
       const Triangle outwards{t[face[0]], t[face[1]], t[face[2]]};
       Triangle sorted = outwards;
-      std::sort(sorted.begin(), sorted.end());
+      std::ranges::sort(sorted);
       sides.push_back({sorted, outwards});
     }
   }
-  std::sort(middles.begin(), middles.end(), [](const Middle& a, const Middle& b) {
+  std::ranges::sort(middles, [](const Middle& a, const Middle& b) {
     return std::pair(a.low, a.high) < std::pair(b.low, b.high);
   });
   for (std::size_t i = 0; i < middles.size(); ++i) {
@@ -102,8 +102,7 @@ Result<SolidMesh> quadratic(const TetrahedronMesh& mesh) {
     solid.elements[middle.place / 6][4 + middle.place % 6] =
         static_cast<int>(solid.points.size()) - 1;
   }
-  std::sort(sides.begin(), sides.end(),
-            [](const Face& a, const Face& b) { return a.sorted < b.sorted; });
+  std::ranges::sort(sides, {}, &Face::sorted);
   for (std::size_t i = 0; i < sides.size(); ++i) {
     const bool has_twin = (i > 0 && sides[i - 1].sorted == sides[i].sorted) ||
                           (i + 1 < sides.size() && sides[i + 1].sorted == sides[i].sorted);
@@ -178,7 +177,7 @@ std::optional<OrientedBox> as_box(const ClosedSurface& closed) {
   const auto farther = [&](const Point3& a, const Point3& b) {
     return length(a - middle) < length(b - middle);
   };
-  const Point3 corner = *std::max_element(points.begin(), points.end(), farther);
+  const Point3 corner = *std::ranges::max_element(points, farther);
   const double size = box_around(points).diagonal();
   const double reach = length(corner - middle);
   std::vector<Point3> corners;
@@ -190,8 +189,7 @@ std::optional<OrientedBox> as_box(const ClosedSurface& closed) {
   if (corners.size() != 8) {
     return std::nullopt;
   }
-  std::sort(corners.begin(), corners.end(),
-            [](const Point3& a, const Point3& b) { return length(a) < length(b); });
+  std::ranges::sort(corners, {}, length);
   // From one corner: sides and face diagonals first, the space diagonal last. Three mutually
   // perpendicular ones are the sides.
   for (std::size_t i = 1; i < 7; ++i) {
@@ -242,9 +240,7 @@ std::optional<DetectedBall> as_ball(const ClosedSurface& closed) {
   const auto& points = closed.surface.points;
   const Point3& first = points.front();
   const auto farthest = [&](auto&& measure) {
-    return *std::max_element(points.begin(), points.end(), [&](const Point3& a, const Point3& b) {
-      return measure(a) < measure(b);
-    });
+    return *std::ranges::max_element(points, {}, measure);
   };
   const Point3 a = farthest([&](const Point3& p) { return length(p - first); }) - first;
   const Point3 b = farthest([&](const Point3& p) { return length(cross(p - first, a)); }) - first;
@@ -258,7 +254,7 @@ std::optional<DetectedBall> as_ball(const ClosedSurface& closed) {
       0.5 / volume *
       (inner(a, a) * cross(b, c) + inner(b, b) * cross(c, a) + inner(c, c) * cross(a, b));
   const DetectedBall ball{first + offset, length(offset)};
-  const bool fits = std::all_of(points.begin(), points.end(), [&](const Point3& p) {
+  const bool fits = std::ranges::all_of(points, [&](const Point3& p) {
     return std::abs(length(p - ball.middle) - ball.radius) < tolerance * ball.radius;
   });
   const double whole = 4.0 / 3.0 * std::numbers::pi * ball.radius * ball.radius * ball.radius;
@@ -290,7 +286,7 @@ std::array<int, 3> box_cells(const Point3& sides, double unknowns) {
   const auto count = [](const std::array<int, 3>& cells) {
     return 3.0 * (2.0 * cells[0] + 1.0) * (2.0 * cells[1] + 1.0) * (2.0 * cells[2] + 1.0);
   };
-  double cell = *std::max_element(sides.begin(), sides.end());
+  double cell = *std::ranges::max_element(sides);
   while (count(cells_of(cell / 1.02)) <= unknowns) {
     cell /= 1.02;
   }
@@ -348,8 +344,7 @@ TetrahedronMesh grid_mesh(const ClosedSurface& closed, double unknowns, const Pr
   for (std::size_t cell = 0; cell < count; ++cell) {
     size[group_of(cell)] += is_inside[cell] != 0 ? 1 : 0;
   }
-  const auto best =
-      static_cast<std::size_t>(std::max_element(size.begin(), size.end()) - size.begin());
+  const auto best = static_cast<std::size_t>(std::ranges::max_element(size) - size.begin());
   TetrahedronMesh mesh = box_mesh(sides, cells);
   std::size_t tetrahedron = 0;
   std::erase_if(mesh.tetrahedra, [&](const Tetrahedron&) {

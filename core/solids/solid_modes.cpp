@@ -141,7 +141,7 @@ SparseMatrix pattern_of(const Elements& elements, const std::vector<int>& row_of
   pattern.value.clear();
   for (int column = 0; column < rows; ++column) {
     std::vector<int>& list = below[at(column)];
-    std::sort(list.begin(), list.end());
+    std::ranges::sort(list);
     list.erase(std::unique(list.begin(), list.end()), list.end());
     pattern.first[at(column)] = static_cast<int>(pattern.row.size());
     pattern.row.push_back(column);
@@ -247,7 +247,7 @@ double SolidDamping::t60_s(double frequency_hz) const {
 }
 
 bool is_clamped(const Point3& point, std::span<const SolidClamp> clamps) {
-  return std::any_of(clamps.begin(), clamps.end(), [&](const SolidClamp& clamp) {
+  return std::ranges::any_of(clamps, [&](const SolidClamp& clamp) {
     return length(point - clamp.centre) <= clamp.radius;
   });
 }
@@ -378,11 +378,10 @@ Result<SolidModes> find_solid_modes(const SolidMesh& mesh, const SolidMaterial& 
     return pairs.error();
   }
   SolidModes modes;
-  modes.rigid =
-      is_free ? rigid_motions
-              : static_cast<int>(std::count_if(
-                    std::begin(pairs->values), std::end(pairs->values),
-                    [&](double value) { return std::abs(value) < rigid_share * std::abs(shift); }));
+  modes.rigid = is_free ? rigid_motions
+                        : static_cast<int>(std::ranges::count_if(pairs->values, [&](double value) {
+                            return std::abs(value) < rigid_share * std::abs(shift);
+                          }));
   if (at(modes.rigid) >= pairs->values.size()) {
     return Error{"no part of it can bend"};
   }
@@ -450,7 +449,7 @@ std::vector<int> spread_on_surface(const SolidMesh& mesh, std::span<const SolidC
   for (const Triangle& triangle : mesh.surface) {
     nodes.insert(nodes.end(), triangle.begin(), triangle.end());
   }
-  std::sort(nodes.begin(), nodes.end());
+  std::ranges::sort(nodes);
   nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
   std::erase_if(nodes, [&](int node) { return is_clamped(mesh.points[at(node)], clamps); });
   const Box3 box = box_around(mesh.points);
@@ -466,7 +465,7 @@ std::vector<int> spread_on_surface(const SolidMesh& mesh, std::span<const SolidC
   }
   std::vector<int> taken;
   while (static_cast<int>(taken.size()) < count && taken.size() < nodes.size()) {
-    const auto next = std::max_element(distance.begin(), distance.end()) - distance.begin();
+    const auto next = std::ranges::max_element(distance) - distance.begin();
     const int node = nodes[static_cast<std::size_t>(next)];
     const bool is_first = taken.empty() && clamps.empty();
     taken.push_back(node);

@@ -83,7 +83,7 @@ Seams find_seams(const Surface& surface, bool is_sheet) {
       edges.push_back({std::min(from, to), std::max(from, to), static_cast<int>(t), from < to});
     }
   }
-  std::sort(edges.begin(), edges.end(), [](const EdgeUse& a, const EdgeUse& b) {
+  std::ranges::sort(edges, [](const EdgeUse& a, const EdgeUse& b) {
     return std::pair(std::pair(a.low, a.high), a.triangle) <
            std::pair(std::pair(b.low, b.high), b.triangle);
   });
@@ -149,8 +149,7 @@ struct Rim {
 std::vector<std::vector<Rim>> find_holes(const Surface& surface, const Seams& seams) {
   const auto side_of = [&](const EdgeUse& use) {
     const Triangle& corners = surface.triangles[at(use.triangle)];
-    const auto* const start =
-        std::find(corners.begin(), corners.end(), use.is_forward ? use.low : use.high);
+    const auto* const start = std::ranges::find(corners, use.is_forward ? use.low : use.high);
     return 3 * use.triangle + static_cast<int>(start - corners.begin());
   };
   const auto corner = [&](int side, int step) {
@@ -279,7 +278,7 @@ std::size_t largest_part(const Surface& surface, const Parts& parts) {
   for (std::size_t t = 0; t < parts.part.size(); ++t) {
     area[at(parts.part[t])] += area_of(surface, surface.triangles[t]);
   }
-  return static_cast<std::size_t>(std::max_element(area.begin(), area.end()) - area.begin());
+  return static_cast<std::size_t>(std::ranges::max_element(area) - area.begin());
 }
 
 // Welds points within 1e-6 of the size, and drops repeated triangles, those without area and unused
@@ -297,7 +296,7 @@ Result<Surface> tidied(const Surface& given, Repairs& repairs, const Progress& p
   for (const Triangle& triangle : given.triangles) {
     Triangle corners{same[at(triangle[0])], same[at(triangle[1])], same[at(triangle[2])]};
     Triangle sorted = corners;
-    std::sort(sorted.begin(), sorted.end());
+    std::ranges::sort(sorted);
     if (sorted[0] == sorted[1] || sorted[1] == sorted[2] || !seen.insert(sorted).second) {
       ++repairs.left_out;
       continue;
@@ -324,7 +323,7 @@ Result<Surface> tidied(const Surface& given, Repairs& repairs, const Progress& p
 // Drops the triangles of some parts.
 void keep_parts(Surface& surface, Parts& parts, const std::vector<char>& is_kept,
                 Repairs& repairs) {
-  const auto dropped = std::count(is_kept.begin(), is_kept.end(), 0);
+  const auto dropped = std::ranges::count(is_kept, 0);
   if (dropped == 0) {
     return;
   }
@@ -379,8 +378,8 @@ void keep_one_body(Surface& surface, Parts& parts, const std::vector<Triangle>& 
     volume.push_back(six_volumes(part));
   }
   const auto outer = static_cast<std::size_t>(
-      std::max_element(volume.begin(), volume.end(),
-                       [](double a, double b) { return std::abs(a) < std::abs(b); }) -
+      std::ranges::max_element(volume,
+                               [](double a, double b) { return std::abs(a) < std::abs(b); }) -
       volume.begin());
   // A part inside another one has all its corners there; a few of them tell.
   const auto is_within = [&](std::size_t part, std::size_t other) {
@@ -507,8 +506,7 @@ Result<ClosedSurface> close_surface(const Surface& given, const Progress& progre
   const Box3 box = box_around(surface.points);
   const Point3 sides = box.high - box.low;
   const double size = box.diagonal();
-  if (!(closed.volume > 1e-9 * size * size * size) ||
-      *std::min_element(sides.begin(), sides.end()) <= 0.0) {
+  if (!(closed.volume > 1e-9 * size * size * size) || *std::ranges::min_element(sides) <= 0.0) {
     return Error{"the surface encloses no volume: its volume is " + std::to_string(closed.volume) +
                  " m^3"};
   }

@@ -32,7 +32,7 @@ std::string ports_of(const PlacedModes& body) {
 std::string listen_at(Network& network, const std::string& place) {
   for (std::uint32_t i = 0; i < network.macros.size(); ++i) {
     const std::vector<std::string>& places = network.macros[i].places;
-    const auto found = std::find(places.begin(), places.end(), place);
+    const auto found = std::ranges::find(places, place);
     if (found == places.end()) {
       continue;
     }
@@ -53,7 +53,7 @@ std::string listen_at(Network& network, const std::string& place) {
 
 // The first mass of a chain is both struck and heard.
 std::string ports_of(const ModalChain& chain) {
-  const auto first = std::find_if(chain.network.masses.begin(), chain.network.masses.end(), moves);
+  const auto first = std::ranges::find_if(chain.network.masses, moves);
   const std::string name = first->name.text();
   return "@in1 frcInput @" + name + "\n@out1 posOutput @" + name + "\n";
 }

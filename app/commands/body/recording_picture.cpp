@@ -159,7 +159,7 @@ plot::Figure recording_figure(const Identification& found, const RecordingParts&
   const std::vector<double> bins = magnitudes(found.sound, size);
   const Scale scale{.rate_hz = found.rate_hz,
                     .highest_hz = std::min(20000.0, 0.5 * found.rate_hz),
-                    .reference = std::max(1e-30, *std::max_element(bins.begin(), bins.end()))};
+                    .reference = std::max(1e-30, *std::ranges::max_element(bins))};
   plot::Figure figure{.title = title + ": " + counted(found.modes.size(), "mode", "modes"),
                       .columns = 3,
                       .panels = spectrogram_panels(parts)};

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <complex>
 #include <numbers>
+#include <numeric>
 
 #include "app/commands/body/recording.h"
 #include "app/text.h"
@@ -136,11 +137,7 @@ double loudest_hz(const Identification& found) {
     }
     return square * mode.t60_s.value;
   };
-  return std::max_element(found.modes.begin(), found.modes.end(),
-                          [&](const IdentifiedMode& a, const IdentifiedMode& b) {
-                            return energy(a) < energy(b);
-                          })
-      ->frequency_hz.value;
+  return std::ranges::max_element(found.modes, {}, energy)->frequency_hz.value;
 }
 
 // Returns the modes as they are when their sum is smallest, in the first millisecond, so that they
@@ -161,10 +158,7 @@ std::vector<IdentifiedMode> starting_modes(const Identification& found) {
         sums[c] += mode.amplitude[c].value * std::cos(mode.phase_rad[c].value);
       }
     }
-    double square = 0.0;
-    for (const double sum : sums) {
-      square += sum * sum;
-    }
+    const double square = std::inner_product(sums.begin(), sums.end(), sums.begin(), 0.0);
     if (square < least) {
       least = square;
       best = std::move(modes);

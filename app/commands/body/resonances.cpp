@@ -64,9 +64,7 @@ std::optional<std::vector<Resonance>> parse_resonances(std::string_view text) {
     }
     resonances.push_back(mode);
   }
-  std::stable_sort(
-      resonances.begin(), resonances.end(),
-      [](const Resonance& a, const Resonance& b) { return a.frequency_hz < b.frequency_hz; });
+  std::ranges::stable_sort(resonances, {}, &Resonance::frequency_hz);
   return resonances.empty() ? std::nullopt : std::optional(resonances);
 }
 

@@ -59,7 +59,7 @@ std::string body_name(const std::string& file) {
 
 bool is_place_name(const std::string& name) {
   return !name.empty() && std::isalpha(static_cast<unsigned char>(name[0])) != 0 &&
-         std::all_of(name.begin(), name.end(), [](char c) {
+         std::ranges::all_of(name, [](char c) {
            return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
          });
 }
@@ -223,9 +223,8 @@ Result<std::vector<SolidPlace>> choose_places(const SolidBodyOptions& options,
     if (!(length(direction) > 0.0)) {
       return Error{"--place " + picked.name + ": the direction must not be 0"};
     }
-    const bool is_taken = std::any_of(places.begin(), places.end(), [&](const SolidPlace& other) {
-      return other.name == picked.name;
-    });
+    const bool is_taken = std::ranges::any_of(
+        places, [&](const SolidPlace& other) { return other.name == picked.name; });
     if (is_taken) {
       return Error{"--place " + picked.name + " is defined twice"};
     }

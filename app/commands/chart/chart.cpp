@@ -9,6 +9,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <numeric>
 
 #include "app/commands/chart/judge.h"
 #include "app/commands/output.h"
@@ -58,19 +59,18 @@ bool sounds(const ChartScene& scene, Isa isa) {
     return true;  // the reference solution will report the reason
   }
   const Waves waves = render_way(*made, static_cast<std::size_t>(heard_s * scene_rate_hz));
-  return std::any_of(waves.begin(), waves.end(), [](const std::vector<double>& wave) {
-    return std::any_of(wave.begin(), wave.end(), [&](double y) { return y != wave[0]; });
+  return std::ranges::any_of(waves, [](const std::vector<double>& wave) {
+    return std::ranges::any_of(wave, [&](double y) { return y != wave[0]; });
   });
 }
 
 // Compares bit by bit, so that NaN equals NaN.
 bool is_same(const PlayedWay& a, const PlayedWay& b) {
   return a.made.way.precision == b.made.way.precision && a.made.methods == b.made.methods &&
-         std::equal(a.waves.begin(), a.waves.end(), b.waves.begin(), b.waves.end(),
-                    [](const auto& x, const auto& y) {
-                      return x.size() == y.size() &&
-                             std::memcmp(x.data(), y.data(), x.size() * sizeof(double)) == 0;
-                    });
+         std::ranges::equal(a.waves, b.waves, [](const auto& x, const auto& y) {
+           return x.size() == y.size() &&
+                  std::memcmp(x.data(), y.data(), x.size() * sizeof(double)) == 0;
+         });
 }
 
 // Plays all methods that can play the scene. Methods with equal output become one.
@@ -86,8 +86,8 @@ std::vector<PlayedWay> play_all(const Starts& starts, Isa isa, const ReportProgr
     }
     PlayedWay played{.made = *std::move(made), .waves = {}};
     played.waves = render_way(played.made, static_cast<std::size_t>(heard_s * scene_rate_hz));
-    const auto twin = std::find_if(all.begin(), all.end(),
-                                   [&](const PlayedWay& other) { return is_same(other, played); });
+    const auto twin =
+        std::ranges::find_if(all, [&](const PlayedWay& other) { return is_same(other, played); });
     if (twin == all.end()) {
       all.push_back(std::move(played));
     } else {
@@ -145,10 +145,7 @@ std::vector<double> time_ways(std::vector<MadeWay>& ways, double patience_s,
   }
   std::vector<double> ns;
   for (const std::vector<double>& one : shortest_ns) {
-    double sum = 0.0;
-    for (const double stretch_ns : one) {
-      sum += stretch_ns;
-    }
+    const double sum = std::accumulate(one.begin(), one.end(), 0.0);
     ns.push_back(sum / static_cast<double>(one.size() * stretch));
   }
   return stops() ? std::vector<double>() : ns;

@@ -97,8 +97,7 @@ std::size_t onset_of(const Waves& waves) {
   const double least = heard_share * peak_of(waves);
   std::size_t first = waves.empty() ? 0 : waves[0].size();
   for (const auto& wave : waves) {
-    const auto heard =
-        std::find_if(wave.begin(), wave.end(), [&](double y) { return std::fabs(y) > least; });
+    const auto heard = std::ranges::find_if(wave, [&](double y) { return std::fabs(y) > least; });
     first = std::min(first, static_cast<std::size_t>(heard - wave.begin()));
   }
   return first;

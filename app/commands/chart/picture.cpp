@@ -54,7 +54,7 @@ plot::Series front(const ChartSheet& sheet, ChartReference reference, const plot
       points.emplace_back(row.ns, error_db(row, reference));
     }
   }
-  std::sort(points.begin(), points.end());
+  std::ranges::sort(points);
   plot::Series series{.style = front_style};
   for (const auto& [ns, db] : points) {
     series.data += (series.data.empty() ? plot::row({ns, panel.y.to}) : "") + plot::row({ns, db});

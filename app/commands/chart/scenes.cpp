@@ -91,8 +91,8 @@ Network string_on_stop() {
 }
 
 bool has_contacts(const Network& network) {
-  return std::any_of(network.links.begin(), network.links.end(),
-                     [](const Link& link) { return facts_of(link.law).is_one_sided(); });
+  return std::ranges::any_of(network.links,
+                             [](const Link& link) { return facts_of(link.law).is_one_sided(); });
 }
 
 double value_of(const ControlSetting& control) {
@@ -154,7 +154,7 @@ std::uint32_t struck_by(const Network& network, const Input& input) {
 }
 
 bool is_still(const Network& network) {
-  return std::none_of(network.masses.begin(), network.masses.end(), [&](const Mass& mass) {
+  return std::ranges::none_of(network.masses, [&](const Mass& mass) {
     return moves(mass) && (mass.position != 0.0 || initial_velocity(network, mass) != 0.0 ||
                            mass.gravity != no_argument);
   });
@@ -229,8 +229,8 @@ std::string plain(std::string name) {
 
 Result<ChartScene> scene_of(const std::string& name, Network network, const Preset& preset) {
   ChartScene scene{.name = plain(name), .network = expand_macros(network)};
-  const auto heard = std::any_of(scene.network.parameters.begin(), scene.network.parameters.end(),
-                                 [](const Parameter& p) { return p.audio_input > 0; });
+  const auto heard = std::ranges::any_of(scene.network.parameters,
+                                         [](const Parameter& p) { return p.audio_input > 0; });
   if (heard) {
     return Error{name + ": the chart cannot play audio inputs of parameters"};
   }
@@ -249,8 +249,7 @@ Result<ChartScene> scene_of(const std::string& name, Network network, const Pres
 }  // namespace
 
 bool ChartScene::is_driven() const {
-  return std::any_of(motions.begin(), motions.end(),
-                     [](const InputMotion& motion) { return motion != nullptr; });
+  return std::ranges::any_of(motions, [](const InputMotion& motion) { return motion != nullptr; });
 }
 
 const std::vector<std::string>& reference_scenes() {

@@ -45,7 +45,7 @@ std::vector<bool> front_of(std::span<const CostAndAccuracy> points) {
       order.push_back(i);
     }
   }
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+  std::ranges::stable_sort(order, [&](std::size_t a, std::size_t b) {
     return points[a].ns < points[b].ns ||
            (points[a].ns == points[b].ns && points[a].snr_db > points[b].snr_db);
   });

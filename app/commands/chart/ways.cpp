@@ -111,8 +111,8 @@ Result<MadeWay> make_way(const ChartScene& scene, const Way& way, double seconds
   }
   MadeWay made{.way = way, .engine = std::move(compiled->engine)};
   const std::vector<Part>& parts = compiled->plan.parts;
-  const bool obeys = std::any_of(parts.begin(), parts.end(),
-                                 [&](const Part& part) { return part.method == way.method; });
+  const bool obeys =
+      std::ranges::any_of(parts, [&](const Part& part) { return part.method == way.method; });
   if (way.method && !obeys) {
     return Error{std::string(method_name(*way.method)) + " cannot play this network"};
   }

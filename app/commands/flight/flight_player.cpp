@@ -116,9 +116,7 @@ Result<Done> FlightPlayer::play(const std::function<Result<Done>(std::span<const
         process.repeat(record);
         continue;
       }
-      const auto made_of =
-          std::find_if(flight_.engines.begin(), flight_.engines.end(),
-                       [&](const FlightEngine& engine) { return engine.number == record.count; });
+      const auto made_of = std::ranges::find(flight_.engines, record.count, &FlightEngine::number);
       if (made_of == flight_.engines.end()) {
         return Error{"the flight has no engine " + std::to_string(record.count)};
       }

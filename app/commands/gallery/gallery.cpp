@@ -130,7 +130,7 @@ std::vector<double> peaks_of(const Sound& sound, Stretch from_start, std::size_t
       peak = std::max(peak, std::fabs(channel[n]));
     }
   }
-  std::transform(peaks.begin(), peaks.end(), peaks.begin(), to_dbfs);
+  std::ranges::transform(peaks, peaks.begin(), to_dbfs);
   return peaks;
 }
 

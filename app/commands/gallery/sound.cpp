@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numeric>
 #include <span>
 
 namespace ressort::commands {
@@ -22,11 +23,7 @@ std::span<const double> part_of(const Sound& sound, std::size_t channel, Stretch
 }
 
 double power_of(std::span<const double> samples) {
-  double sum = 0.0;
-  for (const double y : samples) {
-    sum += y * y;
-  }
-  return sum;
+  return std::inner_product(samples.begin(), samples.end(), samples.begin(), 0.0);
 }
 
 double power_db(double power) {
@@ -72,12 +69,11 @@ std::optional<double> attack_ms(const Sound& sound, Stretch stretch) {
   if (levels.empty()) {
     return std::nullopt;
   }
-  const double highest = *std::max_element(levels.begin(), levels.end());
+  const double highest = *std::ranges::max_element(levels);
   if (highest <= silence_db) {
     return std::nullopt;
   }
-  const auto there =
-      std::find_if(levels.begin(), levels.end(), [&](double db) { return db >= highest - 6.0; });
+  const auto there = std::ranges::find_if(levels, [&](double db) { return db >= highest - 6.0; });
   return 1e3 * step_s * static_cast<double>(there - levels.begin() + 1);
 }
 
@@ -86,7 +82,7 @@ std::optional<double> t60_s(const Sound& sound, Stretch stretch) {
   constexpr double least_fall_db = 3.0;
   constexpr double fitted_db = 40.0;
   const std::vector<double> levels = levels_db(sound, stretch, step_s);
-  const auto first = std::max_element(levels.begin(), levels.end());
+  const auto first = std::ranges::max_element(levels);
   if (first == levels.end() || *first <= silence_db) {
     return std::nullopt;
   }

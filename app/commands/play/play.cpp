@@ -91,9 +91,8 @@ class Player {
     if (!controllers) {
       return refuse(controllers.error().message);
     }
-    options_.device.sends_midi =
-        std::any_of(controllers->begin(), controllers->end(),
-                    [](const ControllerSetting& setting) { return setting.input.sends; });
+    options_.device.sends_midi = std::ranges::any_of(
+        *controllers, [](const ControllerSetting& setting) { return setting.input.sends; });
     if (const int failure = join_manager(); failure != exit_code::done || has_called_off_) {
       return failure;
     }

@@ -221,7 +221,7 @@ Division read_division(Reader& reader) {
 }
 
 bool is_chunk(Bytes type, std::string_view name) {
-  return std::equal(type.begin(), type.end(), name.begin(), name.end());
+  return std::ranges::equal(type, name);
 }
 
 // Returns the offset of a chunk's name at or after `from`, or the end of the file.
@@ -283,7 +283,7 @@ class Tracks {
   }
   bool is_chunk_at(std::size_t at) const {
     const Bytes name = file_.subspan(at, std::min<std::size_t>(4, file_.size() - at));
-    return name.empty() || (name.size() == 4 && std::all_of(name.begin(), name.end(), [](int c) {
+    return name.empty() || (name.size() == 4 && std::ranges::all_of(name, [](int c) {
                               return std::isalnum(c) != 0 || c == ' ';
                             }));
   }
@@ -351,15 +351,13 @@ Result<MidiFile> parse_midi_file(Bytes file) {
                                  ", the file has " + std::to_string(found));
   }
   std::vector<TrackEvent> events = reading.take_events();
-  const bool is_empty = std::all_of(events.begin(), events.end(), [](const TrackEvent& event) {
-    return event.kind == TrackEvent::Kind::end;
-  });
+  const bool is_empty = std::ranges::all_of(
+      events, [](const TrackEvent& event) { return event.kind == TrackEvent::Kind::end; });
   if (is_empty && !midi.warnings.empty()) {
     return Error{midi.warnings.front()};
   }
 
-  std::stable_sort(events.begin(), events.end(),
-                   [](const TrackEvent& a, const TrackEvent& b) { return a.tick < b.tick; });
+  std::ranges::stable_sort(events, {}, &TrackEvent::tick);
   constexpr double default_quarter_s = 0.5;  // 120 quarter notes a minute
   double tick_s =
       division.tick_s > 0.0 ? division.tick_s : default_quarter_s / division.ticks_per_quarter;
@@ -484,8 +482,8 @@ Result<MidiFile> read_midi_file(const std::string& path,
 
 bool is_midi_file_name(std::string_view path) {
   std::string lower(path);
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::ranges::transform(lower, lower.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return lower.ends_with(".mid") || lower.ends_with(".midi") || lower.ends_with(".rmi");
 }
 

@@ -66,8 +66,8 @@ void MidiPlayer::release_keys(Song::Clock::time_point time) {
 // Sends the last value of everything that the messages before a position set, in their order.
 // Returns the first message from there on.
 std::size_t MidiPlayer::go_to(double position_s, Song::Clock::time_point time) {
-  const auto next = std::partition_point(
-      file_.messages.begin(), file_.messages.end(),
+  const auto next = std::ranges::partition_point(
+      file_.messages,
       [&](const MidiFile::Message& message) { return message.time_s < position_s; });
   std::map<std::pair<int, int>, std::size_t> newest;
   const auto count = static_cast<std::size_t>(next - file_.messages.begin());

@@ -30,7 +30,7 @@ double highest_hz(const Description& description) {
 // Levels relative to the strongest bin or line.
 std::vector<double> levels_db(const Description& description, SpectrumKind kind) {
   const std::vector<double>& spectrum = description.spectrum;
-  const double most = *std::max_element(spectrum.begin(), spectrum.end());
+  const double most = *std::ranges::max_element(spectrum);
   const double factor = kind == SpectrumKind::magnitude ? 20.0 : 10.0;
   std::vector<double> levels;
   for (const double value : spectrum) {

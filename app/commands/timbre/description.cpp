@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "app/session/sound_file.h"
 #include "app/text.h"
@@ -87,10 +88,7 @@ class LoudestStretch {
 
  private:
   void end() {
-    double energy = 0.0;
-    for (const double sample : now_) {
-      energy += sample * sample;
-    }
+    const double energy = std::inner_product(now_.begin(), now_.end(), now_.begin(), 0.0);
     if (energy > energy_ || loudest_.empty()) {
       energy_ = energy;
       std::swap(loudest_, now_);

@@ -205,8 +205,8 @@ int shape_model(const ShapeOptions& options, const std::function<bool()>& should
   const bool has_keys = scene->has_preset && instrument.mode.has_value();
   std::vector<TimbreTarget> targets = options.targets;
   const auto is_asked = [&](TargetFigure figure) {
-    return std::any_of(targets.begin(), targets.end(),
-                       [&](const TimbreTarget& target) { return target.figure == figure; });
+    return std::ranges::any_of(targets,
+                               [&](const TimbreTarget& target) { return target.figure == figure; });
   };
   for (const TimbreTarget& target : like.targets) {
     if (!is_asked(target.figure)) {

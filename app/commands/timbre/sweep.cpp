@@ -163,8 +163,8 @@ std::string to_csv(const SweepTable& table, const std::vector<SweptParameter>& s
 
 int sweep(const DescribeOptions& options, const std::function<bool()>& should_continue) {
   SweepTable table{.of = options.name, .names = figure_names()};
-  const auto pictures = std::count_if(options.outputs.begin(), options.outputs.end(),
-                                      [](const auto& path) { return path.ends_with(".svg"); });
+  const auto pictures = std::ranges::count_if(
+      options.outputs, [](const auto& path) { return path.ends_with(".svg"); });
   if (options.as_json) {
     return reject("--json: not available with --sweep, which writes CSV");
   }

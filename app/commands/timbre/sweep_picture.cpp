@@ -37,7 +37,7 @@ class SweepDrawer {
       : table_(table), options_(options), laws_(laws) {
     for (const SweepRow& row : table.rows) {
       const std::vector<double> others(row.at.begin() + 1, row.at.end());
-      if (std::find(lines_.begin(), lines_.end(), others) == lines_.end()) {
+      if (std::ranges::find(lines_, others) == lines_.end()) {
         lines_.push_back(others);
       }
     }
@@ -148,7 +148,7 @@ class SweepDrawer {
 
 Result<plot::Figure> sweep_figure(const SweepTable& table, const DescribeOptions& options) {
   const auto number_of = [&](const std::string& name) -> Result<std::size_t> {
-    const auto found = std::find(table.names.begin(), table.names.end(), name);
+    const auto found = std::ranges::find(table.names, name);
     return found != table.names.end()
                ? Result<std::size_t>(static_cast<std::size_t>(found - table.names.begin()))
                : Error{"there is no figure '" + name + "'; there are " + joined(table.names, ", ")};
@@ -169,8 +169,7 @@ Result<plot::Figure> sweep_figure(const SweepTable& table, const DescribeOptions
       return Error{"--law: '" + law.formula + "': " + formula.error().message};
     }
     laws.push_back({*figure, *std::move(formula)});
-    if (options.figures.empty() &&
-        std::find(wanted.begin(), wanted.end(), law.figure) == wanted.end()) {
+    if (options.figures.empty() && std::ranges::find(wanted, law.figure) == wanted.end()) {
       wanted.push_back(law.figure);
     }
   }

@@ -36,7 +36,7 @@ std::size_t padded(std::size_t size) {
 
 // Takes a padded string from the front of `left`.
 Fault take_string(Bytes& left, const char* what, std::string_view& text) {
-  const auto end = std::find(left.begin(), left.end(), std::uint8_t{0});
+  const auto end = std::ranges::find(left, std::uint8_t{0});
   if (end == left.end()) {
     return Error{std::string(what) + " does not end within its message"};
   }
@@ -62,7 +62,7 @@ Fault take_blob(Bytes& left) {
     return Error{"a blob is longer than its message"};
   }
   const Bytes padding = left.subspan(size, padded(size) - size);
-  if (std::any_of(padding.begin(), padding.end(), [](std::uint8_t byte) { return byte != 0; })) {
+  if (std::ranges::any_of(padding, [](std::uint8_t byte) { return byte != 0; })) {
     return Error{"a blob is not padded with zeros to a multiple of 4 bytes"};
   }
   left = left.subspan(padded(size));
@@ -113,7 +113,7 @@ Fault check_message(Bytes left) {
     return fault;
   }
   if (!address.starts_with('/') ||
-      std::any_of(address.begin(), address.end(), [](char c) { return c < ' ' || c > '~'; })) {
+      std::ranges::any_of(address, [](char c) { return c < ' ' || c > '~'; })) {
     return Error{"an address must begin with '/' and be printable ASCII"};
   }
   if (left.empty()) {

@@ -83,9 +83,9 @@ bool is_this_machine(std::uint32_t address) {
 }
 
 bool may_send(std::span<const Subnet> allowed, std::uint32_t address) {
-  return is_this_machine(address) ||
-         std::any_of(allowed.begin(), allowed.end(),
-                     [&](const Subnet& subnet) { return contains(subnet, address); });
+  return is_this_machine(address) || std::ranges::any_of(allowed, [&](const Subnet& subnet) {
+           return contains(subnet, address);
+         });
 }
 
 std::string print_address(std::uint32_t address) {

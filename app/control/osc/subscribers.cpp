@@ -56,8 +56,8 @@ bool Subscribers::remove(const OscClient& client) {
 int Subscribers::send_changes(Session& session, std::int64_t now_ns) {
   std::erase_if(all_, [&](const Subscriber& subscriber) { return subscriber.until_ns <= now_ns; });
   const auto wants = [&](News news) {
-    return std::any_of(all_.begin(), all_.end(),
-                       [&](const Subscriber& subscriber) { return subscriber.news == news; });
+    return std::ranges::any_of(
+        all_, [&](const Subscriber& subscriber) { return subscriber.news == news; });
   };
   if (wants(News::changes)) {
     tell_changes(session);

@@ -100,7 +100,7 @@ void FlightRecorder::add(FlightEngine engine, bool has_audio_inputs) {
   }
   const std::lock_guard lock(mutex_);
   // Repeated loads of a scene share one text.
-  const auto known = std::find_if(texts_.begin(), texts_.end(), [&](const auto& files) {
+  const auto known = std::ranges::find_if(texts_, [&](const auto& files) {
     return std::equal(files->begin(), files->end(), engine.files->begin(), engine.files->end(),
                       [](const SceneFile& a, const SceneFile& b) {
                         return a.path == b.path && a.text == b.text && a.is_there == b.is_there;
@@ -154,10 +154,9 @@ void FlightRecorder::forget() {
 }
 
 bool FlightRecorder::has_begun() const {
-  return !lost_.empty() ||
-         std::any_of(records_.begin(), records_.end(), [](const FlightRecord& record) {
-           return record.kind == FlightRecord::Kind::take;
-         });
+  return !lost_.empty() || std::ranges::any_of(records_, [](const FlightRecord& record) {
+    return record.kind == FlightRecord::Kind::take;
+  });
 }
 
 Result<Flight> FlightRecorder::flight() const {

@@ -233,8 +233,8 @@ class FlightReader {
       words.ok = words.ok && setup.share.number >= 1 && setup.share.number <= setup.share.of;
     } else if (key == "precision") {
       const std::string_view name = words.word();
-      const auto* const row = std::find_if(std::begin(precisions), std::end(precisions),
-                                           [&](const auto& known) { return known.second == name; });
+      const auto* const row =
+          std::ranges::find_if(precisions, [&](const auto& known) { return known.second == name; });
       words.ok = words.ok && row != std::end(precisions);
       setup.precision = words.ok ? row->first : setup.precision;
       advice_ = name == "compensated" ? "precision 'compensated' no longer exists; use double" : "";
@@ -287,7 +287,7 @@ class FlightReader {
     }
     const std::string_view text = rest_.substr(0, bytes);
     texts_.back()->push_back({words.rest(), std::string(text)});
-    line_ += static_cast<int>(std::count(text.begin(), text.end(), '\n'));
+    line_ += static_cast<int>(std::ranges::count(text, '\n'));
     rest_.remove_prefix(bytes);
     return next().empty();
   }
@@ -332,9 +332,7 @@ class FlightReader {
     } else if (kind == "hurry") {
       record.kind = FlightRecord::Kind::hurry;
     } else {
-      const auto* const row =
-          std::find_if(std::begin(event_names), std::end(event_names),
-                       [&](const KindName& known) { return known.name == kind; });
+      const auto* const row = std::ranges::find(event_names, kind, &KindName::name);
       if (row == std::end(event_names)) {
         return false;
       }

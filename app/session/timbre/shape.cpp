@@ -177,7 +177,7 @@ Result<Shaped> shape_timbre(const ShapeRequest& request, std::vector<TimbreTarge
   }
   for (std::size_t i = 0; i < targets.size(); ++i) {
     const auto same = [&](const TimbreTarget& other) { return other.figure == targets[i].figure; };
-    if (std::count_if(targets.begin(), targets.end(), same) > 1) {
+    if (std::ranges::count_if(targets, same) > 1) {
       return Error{short_name(targets[i].figure) + " is given twice"};
     }
     if (request.has_keys && targets[i].figure == TargetFigure::f0) {
@@ -196,13 +196,13 @@ Result<Shaped> shape_timbre(const ShapeRequest& request, std::vector<TimbreTarge
   if (free.empty()) {
     return nothing_to_turn(scene);
   }
-  StrikeOptions options{.rate_hz = request.rate_hz,
-                        .blows = blows_of(request),
-                        .has_attack = std::any_of(targets.begin(), targets.end(),
-                                                  [](const TimbreTarget& target) {
-                                                    return target.figure == TargetFigure::attack;
-                                                  }),
-                        .progress = request.progress};
+  StrikeOptions options{
+      .rate_hz = request.rate_hz,
+      .blows = blows_of(request),
+      .has_attack = std::ranges::any_of(
+          targets,
+          [](const TimbreTarget& target) { return target.figure == TargetFigure::attack; }),
+      .progress = request.progress};
   shaped.of = scene.name;
   if (request.has_keys) {
     options.key_hz = key_hz(preset, request.key);

@@ -139,8 +139,8 @@ FigureValues figures_of(const FrameTimbre& timbre) {
 }
 
 std::size_t figure_number(std::string_view name) {
-  const auto* const found = std::find_if(std::begin(figures), std::end(figures),
-                                         [&](const auto& figure) { return figure.name == name; });
+  const auto* const found =
+      std::ranges::find_if(figures, [&](const auto& figure) { return figure.name == name; });
   return static_cast<std::size_t>(found - std::begin(figures));
 }
 

@@ -43,8 +43,8 @@ void TimbreWatch::listen(std::chrono::duration<double> time) {
 
 std::vector<TimbreWatch::Heard> TimbreWatch::since(std::uint64_t number) const {
   const std::lock_guard lock(mutex_);
-  const auto first = std::find_if(frames_.begin(), frames_.end(),
-                                  [&](const Heard& heard) { return heard.number > number; });
+  const auto first =
+      std::ranges::find_if(frames_, [&](const Heard& heard) { return heard.number > number; });
   return {first, frames_.end()};
 }
 

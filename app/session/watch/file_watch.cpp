@@ -89,8 +89,8 @@ bool FileWatch::has_changed() {
       const auto is_here = [watch = event.wd, name](const auto& folder) {
         return folder.second == watch && is_link(fs::path(folder.first) / name);
       };
-      has_changed = has_changed || (event.mask & IN_CREATE) == 0 ||
-                    std::any_of(folders_.begin(), folders_.end(), is_here);
+      has_changed =
+          has_changed || (event.mask & IN_CREATE) == 0 || std::ranges::any_of(folders_, is_here);
     }
   }
   return has_changed;

@@ -24,7 +24,7 @@ void SceneWatch::follow(const std::vector<SceneFile>& files) {
   if (!watch_->follow(paths)) {
     return;
   }
-  was_edited_ = std::any_of(files.begin(), files.end(), [](const SceneFile& file) {
+  was_edited_ = std::ranges::any_of(files, [](const SceneFile& file) {
     const auto now = read_text(file.path, max_model_bytes);
     return file.is_there ? now && *now != file.text : static_cast<bool>(now);
   });
@@ -58,10 +58,9 @@ std::vector<Setting> start_settings(const Scene& scene) {
 }
 
 bool has_same_parameters(const Network& a, const Network& b) {
-  return std::equal(a.parameters.begin(), a.parameters.end(), b.parameters.begin(),
-                    b.parameters.end(), [](const Parameter& x, const Parameter& y) {
-                      return x.name == y.name && x.audio_input == y.audio_input;
-                    });
+  return std::ranges::equal(a.parameters, b.parameters, [](const Parameter& x, const Parameter& y) {
+    return x.name == y.name && x.audio_input == y.audio_input;
+  });
 }
 
 bool differs_in_numbers_only(const Preset& a, const Preset& b) {

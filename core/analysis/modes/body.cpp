@@ -148,7 +148,7 @@ PlacedModes placed_modes(const NetworkModes& modes) {
   const Network& network = modes.network;
   std::vector<std::uint32_t> masses;
   const auto add = [&](std::uint32_t mass, const std::string& name) {
-    if (std::find(masses.begin(), masses.end(), mass) == masses.end()) {
+    if (std::ranges::find(masses, mass) == masses.end()) {
       masses.push_back(mass);
       out.places.push_back(name);
     }
@@ -186,8 +186,8 @@ PlacedModes placed_modes(const NetworkModes& modes) {
     }
   }
   std::erase_if(out.modes, [&](const PlacedMode& mode) {
-    return std::all_of(mode.displacement.begin(), mode.displacement.end(),
-                       [&](double d) { return std::fabs(d) <= faint * largest; });
+    return std::ranges::all_of(mode.displacement,
+                               [&](double d) { return std::fabs(d) <= faint * largest; });
   });
   return out;
 }
@@ -213,7 +213,7 @@ std::string body_text(const PlacedModes& modes) {
 
 Result<ModalChain> chain_of(const PlacedModes& modes, std::string_view place) {
   constexpr double rate_hz = Network::reference_rate_hz;
-  const auto at = std::find(modes.places.begin(), modes.places.end(), place);
+  const auto at = std::ranges::find(modes.places, place);
   if (at == modes.places.end()) {
     std::string known;
     for (const std::string& name : modes.places) {

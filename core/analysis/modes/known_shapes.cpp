@@ -89,7 +89,7 @@ std::optional<std::vector<HeardMode>> KnownShapes::modes_of(const LinearSystem& 
       modes.push_back(std::move(mode));
     }
   }
-  std::sort(modes.begin(), modes.end(), [](const HeardMode& a, const HeardMode& b) {
+  std::ranges::sort(modes, [](const HeardMode& a, const HeardMode& b) {
     return a.tone.frequency_hz < b.tone.frequency_hz;
   });
   return modes;

@@ -44,8 +44,8 @@ class LayoutMaker {
       are_drawn = are_drawn && mass.drawing > 0;
       loose.push_back({.x = static_cast<double>(loose.size()), .mass = i});
     }
-    layout.is_plane = std::any_of(network_.macros.begin(), network_.macros.end(),
-                                  [](const Macro& macro) { return is_mesh(macro.kind); });
+    layout.is_plane = std::ranges::any_of(network_.macros,
+                                          [](const Macro& macro) { return is_mesh(macro.kind); });
     if (are_drawn && !loose.empty()) {
       layout.is_plane = true;
       for (LayoutPoint& point : loose) {
@@ -103,7 +103,7 @@ class LayoutMaker {
         degree[static_cast<std::size_t>(b)] += 1.0;
       }
     }
-    const bool is_chain = *std::max_element(degree.begin(), degree.end()) <= 2.0;
+    const bool is_chain = *std::ranges::max_element(degree) <= 2.0;
     for (int i = 0; i < size; ++i) {
       elements.push_back({i, i, degree[static_cast<std::size_t>(i)]});
     }
@@ -114,7 +114,7 @@ class LayoutMaker {
     }
     const Vector along = pairs->vectors.column(1);
     if (is_chain) {
-      std::sort(points.begin(), points.end(), [&](const LayoutPoint& a, const LayoutPoint& b) {
+      std::ranges::sort(points, [&](const LayoutPoint& a, const LayoutPoint& b) {
         return along[static_cast<std::size_t>(row[a.mass])] <
                along[static_cast<std::size_t>(row[b.mass])];
       });

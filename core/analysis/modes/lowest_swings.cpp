@@ -202,8 +202,8 @@ class LowestSwings {
       if (!swings) {
         return Error{"the modes were not found: the iteration does not converge"};
       }
-      std::sort(swings->all.begin(), swings->all.end(),
-                [](const Swing& a, const Swing& b) { return a.mu.imag() < b.mu.imag(); });
+      std::ranges::sort(swings->all,
+                        [](const Swing& a, const Swing& b) { return a.mu.imag() < b.mu.imag(); });
       swings->all.resize(std::min(swings->all.size(), count));
       swings->basis = {};  // The basis of the lowest shapes alone is not the full basis.
       bool is_right = true;

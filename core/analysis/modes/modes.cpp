@@ -112,8 +112,7 @@ Result<FoundSwings> find(const LinearSystem& system, const ModeOptions& options,
     found.is_all = false;
   }
   const auto angle = [&](const Swing& swing) { return pole_of(swing.mu, options.scheme).imag(); };
-  std::sort(swings->all.begin(), swings->all.end(),
-            [&](const Swing& a, const Swing& b) { return angle(a) < angle(b); });
+  std::ranges::sort(swings->all, {}, angle);
   if (count > 0 && swings->all.size() > count) {
     swings->all.resize(count);
     found.is_all = false;

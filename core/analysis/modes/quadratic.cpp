@@ -124,8 +124,8 @@ class Quadratic {
   // Modes with equal poles may be mixed arbitrarily. This orthogonalises them, scales each, and
   // improves its mu from its shape.
   void part_alike(std::vector<Swing>& swings) const {
-    std::sort(swings.begin(), swings.end(),
-              [](const Swing& a, const Swing& b) { return a.mu.imag() < b.mu.imag(); });
+    std::ranges::sort(swings,
+                      [](const Swing& a, const Swing& b) { return a.mu.imag() < b.mu.imag(); });
     for (std::size_t first = 0; first < swings.size();) {
       std::size_t end = first + 1;
       while (end < swings.size() &&

@@ -164,7 +164,7 @@ std::vector<std::size_t> lines_of(const Network& network, const Network& expande
     macro_end.push_back(end += node_count(macro));
   }
   const auto at_node = [&](std::size_t mass) {
-    const auto macro = std::upper_bound(macro_end.begin(), macro_end.end(), mass);
+    const auto macro = std::ranges::upper_bound(macro_end, mass);
     return macro == macro_end.end() ? lines.size()
                                     : of_macro[static_cast<std::size_t>(macro - macro_end.begin())];
   };

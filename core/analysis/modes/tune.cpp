@@ -200,10 +200,9 @@ Result<Tuned> tune_mode(const Network& network, std::span<const double> paramete
     if (tuner.swings.empty()) {
       break;
     }
-    swing = *std::max_element(
-        tuner.swings.begin(), tuner.swings.end(), [&](const Swing& a, const Swing& b) {
-          return likeness(a.shape, swing.shape) < likeness(b.shape, swing.shape);
-        });
+    swing = *std::ranges::max_element(tuner.swings, [&](const Swing& a, const Swing& b) {
+      return likeness(a.shape, swing.shape) < likeness(b.shape, swing.shape);
+    });
   }
   return Error{what + hertz(target.frequency_hz) + "; the nearest is " +
                hertz(tuner.frequency_hz(swing))};
@@ -220,8 +219,9 @@ Result<Network> tune_modes(const Network& network, std::span<const double> param
     const auto is_place = [&](std::uint32_t mass) {
       return network.masses[mass].kind == MassKind::point;
     };
-    if (std::any_of(network.links.begin(), network.links.end(),
-                    [&](const Link& link) { return is_place(link.a) || is_place(link.b); })) {
+    if (std::ranges::any_of(network.links, [&](const Link& link) {
+          return is_place(link.a) || is_place(link.b);
+        })) {
       return Error{"the model has " + std::to_string(lines->size()) + " lines of springs for " +
                    std::to_string(count) +
                    " frequencies, and its strings and meshes cannot be expanded into masses, "
@@ -230,8 +230,7 @@ Result<Network> tune_modes(const Network& network, std::span<const double> param
     return tune_modes(canonical(expand_macros(network)), parameters, frequencies_hz, options);
   }
   if (!std::is_sorted(frequencies_hz.begin(), frequencies_hz.end()) ||
-      std::any_of(frequencies_hz.begin(), frequencies_hz.end(),
-                  [](double hz) { return !(hz > 0.0); })) {
+      std::ranges::any_of(frequencies_hz, [](double hz) { return !(hz > 0.0); })) {
     return Error{"expected frequencies above 0 Hz in ascending order"};
   }
   ModeTuner tuner(network, parameters, "", options);

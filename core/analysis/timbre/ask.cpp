@@ -308,8 +308,7 @@ class Search {
         bring_nearer(*end);
       }
     }
-    std::sort(far.begin(), far.end(),
-              [](const auto& a, const auto& b) { return a.cost() < b.cost(); });
+    std::ranges::sort(far, [](const auto& a, const auto& b) { return a.cost() < b.cost(); });
     for (std::size_t i = 0; i < far.size() && (!best_ || i < most_far) && !is_there(); ++i) {
       bring_nearer(far[i]);
     }
@@ -333,9 +332,9 @@ class Search {
 
   // Returns whether another start ended at the same place.
   bool is_again(const Place& end) const {
-    return std::any_of(ends_.begin(), ends_.end(), [&](const Place& other) {
-      return std::equal(end.begin(), end.end(), other.begin(), other.end(),
-                        [](double a, double b) { return std::fabs(a - b) < same_end; });
+    return std::ranges::any_of(ends_, [&](const Place& other) {
+      return std::ranges::equal(end, other,
+                                [](double a, double b) { return std::fabs(a - b) < same_end; });
     });
   }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 namespace ressort::analysis {
@@ -63,10 +64,7 @@ FrameAnalysis::Complex FrameAnalysis::windowed(std::size_t bin, Window window) c
 FrameTimbre FrameAnalysis::next(std::span<const double> samples) {
   FrameTimbre timbre;
   const auto size = static_cast<double>(options_.size);
-  double sum = 0.0;
-  for (const double sample : samples) {
-    sum += sample * sample;
-  }
+  const double sum = std::inner_product(samples.begin(), samples.end(), samples.begin(), 0.0);
   std::swap(before_, spectrum_);
   if (!std::isfinite(sum)) {
     std::fill(bins_.begin(), bins_.end(), Complex());
@@ -107,7 +105,7 @@ std::vector<Partial> FrameAnalysis::partials() const {
   for (std::size_t k = 0; k < bins_.size(); ++k) {
     level[k] = std::norm(windowed(k, Window::hann));
   }
-  const double least = square(quietest_share) * *std::max_element(level.begin(), level.end());
+  const double least = square(quietest_share) * *std::ranges::max_element(level);
   for (std::size_t k = 1; k + 1 < bins_.size(); ++k) {
     if (!(level[k] > level[k - 1]) || level[k] < level[k + 1] || level[k] < least) {
       continue;

@@ -25,8 +25,8 @@ ModalSound::ModalSound(std::span<const Motion> motions, std::vector<std::vector<
   for (const Motion& motion : motions) {
     order.push_back(&motion);
   }
-  std::sort(order.begin(), order.end(),
-            [](const Motion* a, const Motion* b) { return a->pole.imag() < b->pole.imag(); });
+  std::ranges::sort(
+      order, [](const Motion* a, const Motion* b) { return a->pole.imag() < b->pole.imag(); });
   const auto add = [](Turns& turns, std::complex<double> number) {
     turns.real.push_back(number.real());
     turns.imaginary.push_back(number.imag());

@@ -20,9 +20,7 @@ std::vector<Partial> partials_in_frame(std::span<const DecayingPartial> partials
       lines.push_back({partial.frequency_hz, std::fabs(partial.residue) * there * seen});
     }
   }
-  std::stable_sort(lines.begin(), lines.end(), [](const Partial& a, const Partial& b) {
-    return a.frequency_hz < b.frequency_hz;
-  });
+  std::ranges::stable_sort(lines, {}, &Partial::frequency_hz);
   return lines;
 }
 

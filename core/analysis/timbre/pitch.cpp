@@ -36,8 +36,7 @@ std::optional<double> find_f0(std::span<const double> samples, double rate_hz) {
     mean += sample / static_cast<double>(count);
   }
   std::vector<double> padded(2 * std::bit_ceil(count));
-  std::transform(samples.begin(), samples.end(), padded.begin(),
-                 [&](double sample) { return sample - mean; });
+  std::ranges::transform(samples, padded.begin(), [&](double sample) { return sample - mean; });
   std::vector<double> energy(count + 1);  // [n] Energy of the first n samples.
   for (std::size_t n = 0; n < count; ++n) {
     energy[n + 1] = energy[n] + padded[n] * padded[n];
@@ -73,9 +72,8 @@ std::optional<double> find_f0(std::span<const double> samples, double rate_hz) {
       best = std::max(best, likeness[lag]);
     }
   }
-  const auto first = std::find_if(peaks.begin(), peaks.end(), [&](std::size_t peak) {
-    return likeness[peak] >= nearly_as_good * best;
-  });
+  const auto first = std::ranges::find_if(
+      peaks, [&](std::size_t peak) { return likeness[peak] >= nearly_as_good * best; });
   if (first == peaks.end() || best < good_enough) {
     return std::nullopt;
   }

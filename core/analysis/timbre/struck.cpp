@@ -324,9 +324,9 @@ Result<TargetValues> StruckModel::figures_of(const Tuned& tuned, StruckAs how) c
   if (!(loudest > 0.0)) {
     return Error{"the output is silent: no oscillating mode reaches it"};
   }
-  const auto heard = std::find_if(
-      partials.begin(), partials.end(),
-      [&](const DecayingPartial& partial) { return partial.residue > least_residue * loudest; });
+  const auto heard = std::ranges::find_if(partials, [&](const DecayingPartial& partial) {
+    return partial.residue > least_residue * loudest;
+  });
   const std::size_t pitch =
       options_.key_hz ? 0 : static_cast<std::size_t>(heard - partials.begin());
   TargetValues values;

@@ -59,8 +59,7 @@ std::vector<std::size_t> pair_up(const Poles& expected, const Poles& found) {
       pairs.push_back({distance(i, j), i, j});
     }
   }
-  std::sort(pairs.begin(), pairs.end(),
-            [](const Pair& a, const Pair& b) { return a.distance < b.distance; });
+  std::ranges::sort(pairs, {}, &Pair::distance);
   std::vector<std::size_t> of(expected.size(), nobody);
   std::vector<bool> is_taken(found.size());
   for (const Pair& pair : pairs) {

@@ -77,9 +77,8 @@ std::optional<Bow> find_strongest_bow(const Network& network, std::span<const Li
 double bow_steps_per_sample(const Machine& machine) {
   double fewest = HUGE_VAL;
   for (const Program& program : machine.parts) {
-    const bool has_bow =
-        std::any_of(program.link_runs.begin(), program.link_runs.end(),
-                    [](const LinkRun& run) { return is_bow(run.law, run.scheme); });
+    const bool has_bow = std::ranges::any_of(
+        program.link_runs, [](const LinkRun& run) { return is_bow(run.law, run.scheme); });
     const auto* fine = program.form.get_if<Oversampled>();
     const double steps = fine != nullptr && !fine->coarse ? fine->times : 1.0;
     fewest = has_bow ? std::min(fewest, steps) : fewest;

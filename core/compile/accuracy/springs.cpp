@@ -106,10 +106,9 @@ Springs springs_of(const Program& program, std::span<const double> parameters,
       }
     }
   });
-  springs.is_sound = std::all_of(std::begin(root), std::end(root),
-                                 [](double r) { return r > 0.0 && std::isfinite(r); }) &&
-                     std::isfinite(springs.stiffness.values.sum()) &&
-                     std::isfinite(springs.damping.values.sum());
+  springs.is_sound =
+      std::ranges::all_of(root, [](double r) { return r > 0.0 && std::isfinite(r); }) &&
+      std::isfinite(springs.stiffness.values.sum()) && std::isfinite(springs.damping.values.sum());
   return springs;
 }
 
@@ -139,12 +138,12 @@ double steepness_of(const Program& program, std::span<const double> parameters, 
 }
 
 bool has_linear_springs(const Program& program) {
-  return std::any_of(program.link_runs.begin(), program.link_runs.end(),
-                     [](const LinkRun& run) { return facts_of(run.law).contains_spring; });
+  return std::ranges::any_of(program.link_runs,
+                             [](const LinkRun& run) { return facts_of(run.law).contains_spring; });
 }
 
 bool contains_bent_springs(const Program& program) {
-  return std::any_of(program.link_runs.begin(), program.link_runs.end(), [](const LinkRun& run) {
+  return std::ranges::any_of(program.link_runs, [](const LinkRun& run) {
     return !is_linear(run.law) && facts_of(run.law).contains_spring;
   });
 }

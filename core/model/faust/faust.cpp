@@ -193,8 +193,8 @@ Network join_springs(Network expanded, std::span<const LawFacts> laws) {
         (!is_junction(expanded, linear.a) && !is_junction(expanded, linear.b))) {
       continue;
     }
-    const auto rest = std::find_if(expanded.links.begin(), expanded.links.end(),
-                                   [&](const Link& link) { return is_rest(link, linear); });
+    const auto rest = std::ranges::find_if(expanded.links,
+                                           [&](const Link& link) { return is_rest(link, linear); });
     if (rest != expanded.links.end()) {
       const LawFacts& law = laws[static_cast<std::size_t>(rest->law)];
       rest->arguments[law.slot(Role::stiffness)] = linear.arguments[0];
@@ -420,11 +420,9 @@ Error refused(const std::string& why, SourceLocation at) {
 
 bool is_driven(const Network& network, ArgumentId argument) {
   return argument != no_argument &&
-         std::any_of(network.arguments[argument].begin(), network.arguments[argument].end(),
-                     [&](const Step& step) {
-                       return step.op == Op::parameter &&
-                              network.parameters[step.index].audio_input > 0;
-                     });
+         std::ranges::any_of(network.arguments[argument], [&](const Step& step) {
+           return step.op == Op::parameter && network.parameters[step.index].audio_input > 0;
+         });
 }
 
 bool drives_itself(const Network& network, const Mass& mass) {
@@ -489,8 +487,7 @@ class FaustWaveguides {
       const auto rank = [&](const Pass& pass) {
         return order_from_filters(guide.filters, coordinate(pass.mass), pass.runs_right);
       };
-      std::stable_sort(guide.passes.begin(), guide.passes.end(),
-                       [&](const Pass& a, const Pass& b) { return rank(a) < rank(b); });
+      std::ranges::stable_sort(guide.passes, {}, rank);
     }
   }
 
@@ -583,9 +580,7 @@ class FaustWaveguides {
   // The line of a place; `outside` is the force from outside.
   std::string place(const FaustTerms& terms, std::uint32_t mass, const std::string& outside) const {
     const std::string& name = terms.masses[mass];
-    const Guide& guide = *std::find_if(guides_.begin(), guides_.end(), [&](const Guide& any) {
-      return any.macro == &guide_of(network_, mass);
-    });
+    const Guide& guide = *std::ranges::find(guides_, &guide_of(network_, mass), &Guide::macro);
     const std::string sign = guide.macro->kind == MacroKind::open_waveguide ? " + " : " - ";
     std::string left;
     std::string right;
@@ -675,8 +670,8 @@ std::string meaning_of_input(const Network& network, std::span<const std::string
 
 std::string faust_header(const Network& network, std::span<const std::string> masses,
                          const std::string& name, int inputs) {
-  const auto moving = std::count_if(network.masses.begin(), network.masses.end(),
-                                    [](const Mass& mass) { return model::moves(mass); });
+  const auto moving =
+      std::ranges::count_if(network.masses, [](const Mass& mass) { return model::moves(mass); });
   std::string text = "// " + plain(name) +
                      ", a network of masses and springs: " + std::to_string(moving) +
                      " that move, " + std::to_string(network.links.size()) + " links.\n";

@@ -198,9 +198,9 @@ void split_definitions(std::string_view text, std::vector<Definition>& definitio
   while (!text.empty()) {
     const std::string_view line = text.substr(0, std::min(text.size(), text.find('\n') + 1));
     text.remove_prefix(line.size());
-    const std::size_t name = std::min(
-        line.size(), static_cast<std::size_t>(std::find_if_not(line.begin(), line.end(), is_word) -
-                                              line.begin()));
+    const std::size_t name =
+        std::min(line.size(),
+                 static_cast<std::size_t>(std::ranges::find_if_not(line, is_word) - line.begin()));
     if (line.starts_with("//")) {
       comment += line;
     } else if (name > 0 && name < line.size() && line[name] == '(') {

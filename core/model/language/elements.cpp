@@ -213,8 +213,7 @@ std::string Reader::with_slash(std::string_view text) const {
       const bool is_followed = word.size() > name.size() && word.starts_with(name) &&
                                std::all_of(word.begin() + static_cast<std::ptrdiff_t>(name.size()),
                                            word.end(), [](char c) { return c >= '0' && c <= '9'; });
-      if (is_followed && std::find(parameter_names_.begin(), parameter_names_.end(), word) ==
-                             parameter_names_.end()) {
+      if (is_followed && std::ranges::find(parameter_names_, word) == parameter_names_.end()) {
         const std::size_t cut = at + name.size();
         return std::string(text.substr(0, cut)) + "/" + std::string(text.substr(cut));
       }
@@ -429,8 +428,7 @@ std::optional<std::uint32_t> Reader::named_place(const Line& line, const Token& 
   Network& network = out_.network;
   const Macro& body = network.macros[macro];
   const auto place = place_called(body, name);
-  if (!place && std::find(parameter_names_.begin(), parameter_names_.end(), name.text) ==
-                    parameter_names_.end()) {
+  if (!place && std::ranges::find(parameter_names_, name.text) == parameter_names_.end()) {
     const std::vector<std::string_view> names(body.places.begin(), body.places.end());
     std::string all;
     for (const std::string& other : body.places) {

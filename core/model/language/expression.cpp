@@ -246,8 +246,7 @@ Piece infix(const Piece& left, char sign, const Piece& right, Binding binding) {
 }
 
 const Function* function_of(Op op) {
-  const auto* const found = std::find_if(std::begin(functions), std::end(functions),
-                                         [&](const Function& f) { return f.op == op; });
+  const auto* const found = std::ranges::find(functions, op, &Function::op);
   return found == std::end(functions) ? nullptr : found;
 }
 

@@ -42,8 +42,8 @@ std::vector<Keyword> all_keywords() {
   for (std::size_t law = 0; law < law_table().size(); ++law) {
     for (const LawWord& word : law_table()[law].words) {
       // Several laws may share a word; the reader takes the first of them.
-      const bool is_known = std::any_of(
-          all.begin(), all.end(), [&](const Keyword& known) { return known.word == word.word; });
+      const bool is_known =
+          std::ranges::any_of(all, [&](const Keyword& known) { return known.word == word.word; });
       if (!word.word.empty() && !is_known) {
         all.push_back({.word = word.word,
                        .element = Element::link,

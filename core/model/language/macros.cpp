@@ -135,7 +135,7 @@ void Reader::name_places(const Line& line, Macro& body) {
             quoted(place.text) +
                 " is not a name for a place: use letters, digits and '_', and do not "
                 "start with a digit");
-    } else if (std::find(body.places.begin(), body.places.end(), place.text) != body.places.end()) {
+    } else if (std::ranges::find(body.places, place.text) != body.places.end()) {
       error(line, place, "the body has two places called " + quoted(place.text));
     }
     body.places.emplace_back(place.text);
@@ -235,7 +235,7 @@ double Reader::displacement(const Line& line, std::size_t at) {
 
 // Returns the coordinate of a named place.
 std::optional<double> Reader::place_called(const Macro& body, const Token& token) const {
-  const auto place = std::find(body.places.begin(), body.places.end(), token.text);
+  const auto place = std::ranges::find(body.places, token.text);
   if (place == body.places.end()) {
     return std::nullopt;
   }

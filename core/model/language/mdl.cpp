@@ -39,7 +39,7 @@ ParsedNetwork Reader::read(std::string_view text, const ReadOptions& options) {
   int number = 0;
   while (!text.empty() && !count_.is_full()) {
     const auto* const last =
-        std::find_if(text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r'; });
+        std::ranges::find_if(text, [](char c) { return c == '\n' || c == '\r'; });
     const auto end = static_cast<std::size_t>(last - text.begin());
     ++number;
     read_line(text.substr(0, end),
@@ -68,8 +68,7 @@ ParsedNetwork Reader::read(std::string_view text, const ReadOptions& options) {
   progress.spend(8 * entries_.size());
   warn_of_mistakes();
   progress.spend(8 * entries_.size());
-  std::stable_sort(out_.diagnostics.begin(), out_.diagnostics.end(),
-                   [](const Diagnostic& a, const Diagnostic& b) { return a.line < b.line; });
+  std::ranges::stable_sort(out_.diagnostics, {}, &Diagnostic::line);
   entries_ = {};
   labels_ = IndexTable();
   if (out_.ok()) {
@@ -96,9 +95,9 @@ void Reader::read_line(std::string_view text, int number) {
   if (line.label.text.empty()) {
     return error(line, line.label, "expected a label right after '@'");
   }
-  if (line.label.text.size() > longest_label ||
-      std::any_of(line.label.text.begin(), line.label.text.end(),
-                  [](char c) { return std::iscntrl(static_cast<unsigned char>(c)) != 0; })) {
+  if (line.label.text.size() > longest_label || std::ranges::any_of(line.label.text, [](char c) {
+        return std::iscntrl(static_cast<unsigned char>(c)) != 0;
+      })) {
     return error(line, line.label,
                  quoted(line.label.text) + " is not a label: it is longer than " +
                      std::to_string(longest_label) +
@@ -197,9 +196,9 @@ void Reader::declare_all() {
   entries_.shrink_to_fit();
   labels_ = IndexTable(entries_.size());
   const auto count_of = [&](auto is_wanted) {
-    return static_cast<std::size_t>(std::count_if(
-        entries_.begin(), entries_.end(),
-        [&](const Entry& entry) { return is_wanted(keywords()[entry.keyword].element); }));
+    return static_cast<std::size_t>(std::ranges::count_if(entries_, [&](const Entry& entry) {
+      return is_wanted(keywords()[entry.keyword].element);
+    }));
   };
   out_.network.masses.reserve(count_of(is_mass));
   out_.network.drawings.reserve(out_.network.masses.capacity());
@@ -355,7 +354,7 @@ bool Reader::check_count(const Line& line) {
     place = {"", last.column + static_cast<int>(last.text.size())};
   }
   const bool has_blanks =
-      found > most && std::any_of(line.rest.begin(), line.rest.end(), [](const Token& token) {
+      found > most && std::ranges::any_of(line.rest, [](const Token& token) {
         return token.text.size() == 1 &&
                std::string_view("+-*/").find(token.text[0]) != std::string_view::npos;
       });
@@ -458,8 +457,8 @@ void Reader::warn_of_mistakes() {
 }
 
 bool ParsedNetwork::ok() const {
-  return std::none_of(diagnostics.begin(), diagnostics.end(),
-                      [](const Diagnostic& d) { return d.severity == Severity::error; });
+  return std::ranges::none_of(diagnostics,
+                              [](const Diagnostic& d) { return d.severity == Severity::error; });
 }
 
 // Messages about a translated line point to the whole line that it came from.
@@ -487,8 +486,7 @@ static ParsedNetwork read_synth_a_modeler(std::string_view text, ReadOptions opt
                             parsed.diagnostics.end());
     parsed = std::move(read);
   }
-  std::stable_sort(parsed.diagnostics.begin(), parsed.diagnostics.end(),
-                   [](const Diagnostic& a, const Diagnostic& b) { return a.line < b.line; });
+  std::ranges::stable_sort(parsed.diagnostics, {}, &Diagnostic::line);
   return parsed;
 }
 

@@ -15,7 +15,7 @@ namespace {
 // Chooses the first keyword of the law that fits the arguments of the link.
 const LawWord& word_of(const Link& link) {
   const auto& words = facts_of(link.law).words;
-  return *std::find_if(words.begin(), words.end(), [&](const LawWord& word) {
+  return *std::ranges::find_if(words, [&](const LawWord& word) {
     bool holds_all = word.printed > 0;
     for (int i = 0; i < static_cast<int>(most_law_arguments); ++i) {
       const bool is_there = link.arguments[static_cast<std::size_t>(i)] != no_argument;
@@ -150,7 +150,7 @@ class Printer {
     const auto stands_here = [](const Mass& mass) {
       return mass.kind != MassKind::position && mass.kind != MassKind::point;
     };
-    if (std::any_of(network_.masses.begin(), network_.masses.end(), stands_here)) {
+    if (std::ranges::any_of(network_.masses, stands_here)) {
       heading("Masses");
     }
     for (std::size_t i = 0; i < network_.masses.size(); ++i) {

@@ -172,7 +172,7 @@ class Reader {
       }
     }
     const std::string label = "@" + std::string(name);
-    std::sort(numbers.begin(), numbers.end());
+    std::ranges::sort(numbers);
     int next = 1;  // first unused number
     for (const int number : numbers) {
       if (number > next) {

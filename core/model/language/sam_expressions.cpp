@@ -42,12 +42,11 @@ constexpr std::string_view sample_rate = "44100";
 
 template <class List, class Item>
 bool is_in(const List& list, const Item& item) {
-  return std::find(std::begin(list), std::end(list), item) != std::end(list);
+  return std::ranges::find(list, item) != std::end(list);
 }
 
 const NumberFunction* function_of(std::string_view name) {
-  const auto* const found = std::find_if(std::begin(number_functions), std::end(number_functions),
-                                         [&](const NumberFunction& f) { return f.name == name; });
+  const auto* const found = std::ranges::find(number_functions, name, &NumberFunction::name);
   return found == std::end(number_functions) ? nullptr : found;
 }
 
@@ -93,9 +92,9 @@ void SamLines::define_parameters() {
   for (const std::string& name : order_) {
     const SamDefinition& line = lines_.find(name)->second;
     const std::string_view text = line.expression.text;
-    if (line.arguments.empty() &&
-        std::any_of(std::begin(slider_words), std::end(slider_words),
-                    [&](std::string_view word) { return text.find(word) != text.npos; })) {
+    if (line.arguments.empty() && std::ranges::any_of(slider_words, [&](std::string_view word) {
+          return text.find(word) != text.npos;
+        })) {
       expression(line.origin, {name, line.origin.column});
     }
   }
@@ -404,8 +403,8 @@ SamLines::Value SamLines::call(Cursor& at, const Token& name, std::vector<SamSig
   }
   if (function != nullptr) {
     if (arguments.size() != function->count ||
-        !std::all_of(arguments.begin(), arguments.end(),
-                     [](const SamSignals& value) { return is_single_number(value); })) {
+        !std::ranges::all_of(arguments,
+                             [](const SamSignals& value) { return is_single_number(value); })) {
       error(*at.line, name, quoted(name.text) + " is supported for numbers only");
       return std::nullopt;
     }
@@ -451,9 +450,9 @@ std::vector<SamFilter> SamLines::filters(const Cursor& at, const Token& name,
   const bool is_pass = name.text == "lowpass" || name.text == "highpass";
   const std::size_t count = is_pass ? 2 : name.text == "smooth" ? 1 : 0;
   if ((count == 0 && name.text != "smoo" && name.text != "dcblocker") || at.input->size() != 1 ||
-      arguments.size() != count ||
-      !std::all_of(arguments.begin(), arguments.end(),
-                   [](const SamSignals& value) { return is_single_number(value); })) {
+      arguments.size() != count || !std::ranges::all_of(arguments, [](const SamSignals& value) {
+        return is_single_number(value);
+      })) {
     return {};
   }
   const auto is = [&](const std::string& text) { return tidy(*at.line, name, text); };
@@ -613,7 +612,7 @@ std::string SamLines::entry(const Origin& line, const Token& token, const SamSig
               std::to_string(i) + ")";
     }
   }
-  const double least = *std::min_element(y.begin(), y.end());
+  const double least = *std::ranges::min_element(y);
   text = least < 0.0 ? text : "max(" + print_number(least) + "," + text + ")";  // rounding
   if (text.size() <= longest_expression && parse_expression(text, parameters)) {
     return tidy(line, token, text);

@@ -53,8 +53,7 @@ std::size_t closing(std::string_view text) {
 }
 
 std::size_t word_length(std::string_view text) {
-  return static_cast<std::size_t>(std::find_if_not(text.begin(), text.end(), is_of_a_name) -
-                                  text.begin());
+  return static_cast<std::size_t>(std::ranges::find_if_not(text, is_of_a_name) - text.begin());
 }
 
 std::size_t number_length(std::string_view text) {
@@ -117,8 +116,7 @@ bool is_synth_a_modeler(std::string_view text) {
     const char next = length < line.size() ? line[length] : ' ';
     return (word == "faustcode" && next == ':') ||
            ((word == "audioout" || word == "controladjust") && next == ',') ||
-           (next == '(' &&
-            std::find(std::begin(elements), std::end(elements), word) != std::end(elements));
+           (next == '(' && std::ranges::find(elements, word) != std::end(elements));
   }
   return false;
 }
@@ -171,7 +169,7 @@ void SamLines::read_line(std::string_view text, int number) {
     }
     return read_end(origin, rest) ? read_definition(origin, rest) : void();
   }
-  if (std::find(std::begin(elements), std::end(elements), word) == std::end(elements)) {
+  if (std::ranges::find(elements, word) == std::end(elements)) {
     return error(origin, word.empty() ? line : statement.word,
                  "expected an element of Synth-A-Modeler, found " +
                      quoted(word.empty() ? line.text : word) + suggestion(word, elements));

@@ -221,8 +221,7 @@ bool SamTranslator::declare(const Statement& statement) {
                    "ignored: " + quoted(word) + " is not supported; sliders become parameters");
     return false;
   }
-  const auto* const shape = std::find_if(std::begin(shapes), std::end(shapes),
-                                         [&](const SamShape& known) { return known.word == word; });
+  const auto* const shape = std::ranges::find(shapes, word, &SamShape::word);
   if (shape == std::end(shapes)) {
     lines_.error(statement.origin, statement.word,
                  quoted(word) + " is not supported: " +
@@ -780,11 +779,10 @@ std::optional<SamSignal> SamTranslator::force_of(const SamElement& link) {
   }
   for (const std::size_t side : {std::size_t{1}, std::size_t{0}}) {
     const std::string_view end = link.statement->names[side + 1].text;
-    const auto links =
-        std::count_if(elements_.begin(), elements_.end(), [&](const SamElement& other) {
-          return is_link(other.shape->kind) &&
-                 (other.statement->names[1].text == end || other.statement->names[2].text == end);
-        });
+    const auto links = std::ranges::count_if(elements_, [&](const SamElement& other) {
+      return is_link(other.shape->kind) &&
+             (other.statement->names[1].text == end || other.statement->names[2].text == end);
+    });
     if (links == 1 && elements_[ends[side]].guides.empty()) {
       force.parts.push_back(
           {.element = &elements_[ends[side]], .is_force = true, .level = side == 1 ? "1" : "-1"});

@@ -14,14 +14,14 @@ bool is_blank(char c) {
 
 bool is_identifier(std::string_view text) {
   return !text.empty() && std::isdigit(static_cast<unsigned char>(text[0])) == 0 &&
-         std::all_of(text.begin(), text.end(), [](char c) {
+         std::ranges::all_of(text, [](char c) {
            return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
          });
 }
 
 std::string_view first_word(std::string_view text) {
   const auto ends = [](char c) { return is_blank(c) || c == '#' || c == '['; };
-  return {text.begin(), std::find_if(text.begin(), text.end(), ends)};
+  return {text.begin(), std::ranges::find_if(text, ends)};
 }
 
 void split(std::string_view line, std::vector<Token>& tokens) {

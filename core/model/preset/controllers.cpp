@@ -121,9 +121,7 @@ class MappingReader {
   bool read_mode(TomlTable& reader, ControllerSetting& setting) {
     ControllerInput& input = setting.input;
     if (std::string word; reader.text("mode", word)) {
-      const auto* const row =
-          std::find_if(std::begin(mode_words), std::end(mode_words),
-                       [&](const ModeWord& known) { return known.word == word; });
+      const auto* const row = std::ranges::find(mode_words, word, &ModeWord::word);
       if (row == std::end(mode_words)) {
         return reader.fail(*reader.get("mode"),
                            "'mode' must be absolute, twos-complement, offset or sign-magnitude");
@@ -184,9 +182,7 @@ class MappingReader {
 };
 
 std::string source_text(const ControllerInput& input) {
-  const auto* const row =
-      std::find_if(std::begin(source_words), std::end(source_words),
-                   [&](const SourceWord& known) { return known.source == input.source; });
+  const auto* const row = std::ranges::find(source_words, input.source, &SourceWord::source);
   return std::string(row->word) + (input.source == ControllerSource::controller ? "" : " ") +
          std::to_string(input.number);
 }
@@ -248,9 +244,7 @@ std::string name_of(const ControllerInput& input) {
 }
 
 std::string_view name_of(ControllerMode mode) {
-  return std::find_if(std::begin(mode_words), std::end(mode_words),
-                      [&](const ModeWord& row) { return row.mode == mode; })
-      ->word;
+  return std::ranges::find(mode_words, mode, &ModeWord::mode)->word;
 }
 
 std::span<const PresetKey> controller_keys() {

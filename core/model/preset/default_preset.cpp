@@ -30,7 +30,7 @@ const Link* find_link(const Network& network, std::uint32_t mass,
   const auto at_mass = [&](const Link& link) {
     return has_law(facts_of(link.law)) && (link.a == mass || link.b == mass);
   };
-  const auto found = std::find_if(network.links.begin(), network.links.end(), at_mass);
+  const auto found = std::ranges::find_if(network.links, at_mass);
   return found == network.links.end() ? nullptr : &*found;
 }
 
@@ -155,10 +155,9 @@ Preset default_preset(const Network& network, bool bare) {
 std::optional<Error> idle_keys(const Network& network, const Preset& preset) {
   constexpr std::size_t most_told = 3;
   const std::string target = something_to_strike(network);
-  if (target.empty() || std::any_of(preset.controls.begin(), preset.controls.end(),
-                                    [](const ControlSetting& control) {
-                                      return control.source == ControlSource::note;
-                                    })) {
+  if (target.empty() || std::ranges::any_of(preset.controls, [](const ControlSetting& control) {
+        return control.source == ControlSource::note;
+      })) {
     return std::nullopt;
   }
   std::string why;

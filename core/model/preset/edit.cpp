@@ -113,8 +113,7 @@ class Editor {
   }
 
   std::string result() {
-    std::stable_sort(edits_.begin(), edits_.end(),
-                     [](const Edit& a, const Edit& b) { return a.first < b.first; });
+    std::ranges::stable_sort(edits_, {}, &Edit::first);
     std::string all;
     std::size_t at = 0;
     for (const Edit& edit : edits_) {

@@ -42,7 +42,7 @@ std::string misfit_in_voices(const Network& network, const Preset& preset, const
   };
   for (const Output& output : network.outputs) {
     const Formula level = output.level == no_argument ? Formula() : network.arguments[output.level];
-    if (std::any_of(level.begin(), level.end(), is_read)) {
+    if (std::ranges::any_of(level, is_read)) {
       return quoted(name) + " sets the level of an output, which all voices share, so it has no " +
              what + "; use 'keys_db' for a level by key";
     }
@@ -88,8 +88,8 @@ std::string misfit(const Network& network, const Preset& preset, const Parameter
 bool hears_channel(const Network& network, int channel) {
   const auto is_input = [&](const Input& input) { return input.number == channel; };
   const auto is_parameter = [&](const Parameter& one) { return one.audio_input == channel; };
-  return std::any_of(network.inputs.begin(), network.inputs.end(), is_input) ||
-         std::any_of(network.parameters.begin(), network.parameters.end(), is_parameter);
+  return std::ranges::any_of(network.inputs, is_input) ||
+         std::ranges::any_of(network.parameters, is_parameter);
 }
 
 // Returns an error message for outputs of the voices or of a body that drive nothing, or "".
@@ -239,8 +239,7 @@ std::vector<Error> find_preset_errors(const Network& network, const Preset& pres
     return one.name == preset.tuned_along && one.minimum < one.maximum;
   };
   if (!preset.tuned_along.empty() &&
-      (!preset.morph.empty() ||
-       std::none_of(preset.parameters.begin(), preset.parameters.end(), is_tuned_along))) {
+      (!preset.morph.empty() || std::ranges::none_of(preset.parameters, is_tuned_along))) {
     found.push_back({preset.morph.empty()
                          ? "'tuned_along' must name one of [parameters] with a range"
                          : "keys stay in tune along the morph anyway; remove 'tuned_along'",
@@ -263,8 +262,7 @@ std::vector<Error> find_preset_errors(const Network& network, const Preset& pres
     found.push_back(
         {std::move(message), preset.through_location.line, preset.through_location.column});
   }
-  std::stable_sort(found.begin(), found.end(),
-                   [](const Error& a, const Error& b) { return a.line < b.line; });
+  std::ranges::stable_sort(found, {}, &Error::line);
   return found;
 }
 

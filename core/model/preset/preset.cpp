@@ -152,7 +152,7 @@ void read_parameter(std::string name, const toml::node& node, Preset& preset,
 bool is_address(std::string_view text) {
   constexpr std::size_t longest = 255;
   return text.size() > 1 && text.size() <= longest && text[0] == '/' &&
-         std::all_of(text.begin(), text.end(), [](char c) {
+         std::ranges::all_of(text, [](char c) {
            constexpr std::string_view meant_otherwise = "#*,?[]{}";
            return c > ' ' && c <= '~' && meant_otherwise.find(c) == std::string_view::npos;
          });
@@ -436,9 +436,9 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
   read_name(table, reader, preset, control);
   control.gesture = usual_gesture(control.target);
   if (std::string how; reader.text("how", how)) {
-    const auto* row = std::find_if(
-        std::begin(gestures), std::end(gestures),
-        [&](const GestureRow& gesture) { return gesture.name == how && !gesture.does.empty(); });
+    const auto* row = std::ranges::find_if(gestures, [&](const GestureRow& gesture) {
+      return gesture.name == how && !gesture.does.empty();
+    });
     if (row != std::end(gestures)) {
       control.gesture = row->gesture;
     } else {
@@ -485,10 +485,10 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
       control.gesture != Gesture::impulse && control.gesture != Gesture::swing && !is_noise) {
     reader.fail(*table.get("length_ms"), "'length_ms' is for impulses, swings and noise only");
   }
-  const bool has_lengths =
-      control.longest_ms > 0.0 && control.shortest_ms > 0.0 &&
-      std::all_of(control.length_keys.begin(), control.length_keys.end(),
-                  [](const KeyPair& point) { return point[1] > 0.0 && point[2] > 0.0; });
+  const bool has_lengths = control.longest_ms > 0.0 && control.shortest_ms > 0.0 &&
+                           std::ranges::all_of(control.length_keys, [](const KeyPair& point) {
+                             return point[1] > 0.0 && point[2] > 0.0;
+                           });
   if (is_noise && !has_lengths) {
     reader.fail(table,
                 "noise needs 'length_ms' above 0: the T60 of the softest and the hardest "
@@ -505,7 +505,7 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
   }
   constexpr Gesture scaled[] = {Gesture::pluck, Gesture::bow, Gesture::impulse, Gesture::swing};
   if (reader.flag("follows_pitch", control.follows_pitch) &&
-      std::find(std::begin(scaled), std::end(scaled), control.gesture) == std::end(scaled)) {
+      std::ranges::find(scaled, control.gesture) == std::end(scaled)) {
     reader.fail(*table.get("follows_pitch"),
                 "'follows_pitch' is for plucks, bows, impulses and swings");
   }
@@ -531,10 +531,10 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
     reader.fail(*table.get("curve"), "'curve' must be linear or exponential");
   }
   control.exponential = curve == "exponential";
-  const bool is_one_sided =
-      control.low * control.high > 0.0 &&
-      std::all_of(control.range_keys.begin(), control.range_keys.end(),
-                  [&](const KeyPair& point) { return point[1] * point[2] > 0.0; });
+  const bool is_one_sided = control.low * control.high > 0.0 &&
+                            std::ranges::all_of(control.range_keys, [&](const KeyPair& point) {
+                              return point[1] * point[2] > 0.0;
+                            });
   if (control.exponential && (has_range || table.get("range") == nullptr) && !is_one_sided) {
     reader.fail(table, "an exponential curve needs a range on one side of 0");
   }
@@ -543,8 +543,9 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
   }
   const GestureRow& gesture = row_of(control.gesture);
   if (!gesture.needs_travel.empty() && (has_travel || table.get("travel") == nullptr) &&
-      !(control.travel > 0.0 && std::all_of(control.travel_keys.begin(), control.travel_keys.end(),
-                                            [](const KeyPair& point) { return point[1] > 0.0; }))) {
+      !(control.travel > 0.0 && std::ranges::all_of(control.travel_keys, [](const KeyPair& point) {
+          return point[1] > 0.0;
+        }))) {
     reader.fail(table, "a " + std::string(gesture.name) +
                            " needs 'travel': " + std::string(gesture.needs_travel));
   }
@@ -928,9 +929,9 @@ ParsedPreset parse_preset(std::string_view text, IsReserved is_reserved) {
     return read;
   }
   read_root(*parsed, read.preset, read.errors, is_reserved);
-  std::sort(read.preset.parameters.begin(), read.preset.parameters.end(),
-            [](const auto& a, const auto& b) { return a.name < b.name; });
-  std::stable_sort(read.errors.begin(), read.errors.end(), [](const Error& a, const Error& b) {
+  std::ranges::sort(read.preset.parameters,
+                    [](const auto& a, const auto& b) { return a.name < b.name; });
+  std::ranges::stable_sort(read.errors, [](const Error& a, const Error& b) {
     return std::pair(a.line, a.column) < std::pair(b.line, b.column);
   });
   if (read.errors.size() > most_preset_errors) {

@@ -74,7 +74,7 @@ std::optional<Error> too_deep(std::string_view toml) {
       const std::size_t line_start = before.rfind('\n') + 1;  // 0 on the first line
       return Error{
           "this is nested more than " + std::to_string(deepest_toml) + " levels deep; 3 are enough",
-          static_cast<int>(std::count(before.begin(), before.end(), '\n')) + 1,
+          static_cast<int>(std::ranges::count(before, '\n')) + 1,
           static_cast<int>(at - line_start) + 1};
     }
   }
