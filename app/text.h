@@ -7,14 +7,14 @@
 #include <string_view>
 #include <vector>
 
+#include "core/ranges.h"
+
 namespace ressort {
 
 std::string fixed(double number, int digits);
 
 // "1 voice", "2 voices".
 std::string counted(std::size_t count, std::string_view one, std::string_view many);
-
-std::string joined(const std::vector<std::string>& words, std::string_view between);
 
 // Returns the rows in aligned columns, without a final newline.
 std::string table(const std::vector<std::vector<std::string>>& rows, std::size_t indent = 0);

@@ -64,7 +64,7 @@ judge() {
       sees["app/session"] = all " app app/realtime app/session app/control/registry.h"
       sees["app/control"] = all " app app/realtime app/devices app/session app/control"
       sees["app/panel"] = sees["app/control"] " app/panel"
-      sees["app/plot"] = "core/result.h app app/plot"
+      sees["app/plot"] = "core/result.h core/ranges.h app app/plot"
       sees["app/commands"] = sees["app/panel"] " core/identification core/solids app/plot app/commands"
       sees["app/command_line"] = sees["app/commands"] " app/command_line"
       sees["app"] = sees["app/command_line"]
@@ -105,7 +105,7 @@ judge() {
         target = what
         if (match(target, /^(core|app)\/[^\/]*\//)) {
           target = substr(target, 1, RLENGTH - 1)
-        } else if (target ~ /^core\/(rooms|result|formula|progress|groups|lanes|curve|sampled_mode|waveguide_places|raised_cosine|gesture|stroke|input_driver|random|noise|lfo|controller|knob_range|midi_number)[.]h$/) {
+        } else if (target ~ /^core\/(rooms|ranges|result|formula|progress|groups|lanes|curve|sampled_mode|waveguide_places|raised_cosine|gesture|stroke|input_driver|random|noise|lfo|controller|knob_range|midi_number)[.]h$/) {
           target = "core"
         } else if (target ~ /^app\/[^\/]*$/) {
           target = "app"

@@ -12,6 +12,7 @@
 #include "core/compile/plan.h"
 #include "core/compile/stability_check.h"
 #include "core/model/network.h"
+#include "core/ranges.h"
 #include "core/result.h"
 
 namespace ressort::command_line {
@@ -63,10 +64,7 @@ template <class T>
 CLI::Option* add_choice(CLI::App& command, const std::string& name, T& target,
                         const std::vector<std::pair<std::string, T>>& choices,
                         const std::string& help) {
-  std::string words;
-  for (const auto& [word, value] : choices) {
-    words += (words.empty() ? "" : ", ") + word;
-  }
+  const std::string words = joined(choices, ", ", &std::pair<std::string, T>::first);
   return command
       .add_option_function<std::string>(
           name,

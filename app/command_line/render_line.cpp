@@ -4,6 +4,7 @@
 #include "app/command_line/command_lines.h"
 #include "app/command_line/options.h"
 #include "app/commands/commands.h"
+#include "core/ranges.h"
 
 namespace ressort::command_line {
 namespace {
@@ -54,11 +55,9 @@ void add_render(CLI::App& app, int& code) {
   RenderOptions& options = choice.options;
   add_model(*command, options.name,
             "preset or model, by name or file; a .ressort file (last 30 s)");
-  std::string endings;
-  for (const std::string_view ending : sound_endings()) {
-    endings += (endings.empty() ? "" : " ") + std::string(ending);
-  }
-  command->add_option("-o,--output", options.output, "sound file to write: " + endings)
+  command
+      ->add_option("-o,--output", options.output,
+                   "sound file to write: " + joined(sound_endings(), " "))
       ->type_name("FILE")
       ->required();
   command->add_option("-s,--seconds", options.seconds, "duration in s")

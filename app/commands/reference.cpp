@@ -92,9 +92,8 @@ void print_status() {
   for (const StatusRow& row : status_rows()) {
     rows.push_back(&row);
   }
-  std::ranges::stable_sort(rows, [](const StatusRow* a, const StatusRow* b) {
-    return static_cast<unsigned>(a->place) < static_cast<unsigned>(b->place);
-  });
+  std::ranges::stable_sort(rows, {},
+                           [](const StatusRow* row) { return static_cast<unsigned>(row->place); });
   print_head({"place", "figure", "unit", "meaning"});
   for (const StatusRow* const row : rows) {
     print_row({row->place == not_in_reply ? "" : std::to_string(row->place + 1), code(row->name),

@@ -5,6 +5,7 @@
 #include "app/control/console_commands.h"
 #include "app/text.h"
 #include "core/model/language/expression.h"
+#include "core/ranges.h"
 
 namespace ressort::control {
 namespace {
@@ -134,10 +135,7 @@ Result<Done> control_song(Session& session, const std::string& word,
 }
 
 Result<Done> command::song(ConsoleContext& console, Words words) {
-  std::vector<Argument> numbers;
-  for (const std::string& word : words.subspan(1)) {
-    numbers.push_back(to_argument(word));
-  }
+  const auto numbers = mapped(words.subspan(1), to_argument);
   auto done = control_song(console.session, words[0], numbers);
   if (done) {
     console.print(console.session.song().description());

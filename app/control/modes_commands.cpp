@@ -4,6 +4,7 @@
 #include "app/control/console_commands.h"
 #include "app/session/modes/known_modes.h"
 #include "core/model/language/expression.h"
+#include "core/ranges.h"
 
 namespace ressort::control {
 
@@ -29,10 +30,7 @@ Result<Done> command::tune(ConsoleContext& console, Words words) {
   if (!loaded(console)) {
     return nothing_loaded;
   }
-  std::vector<Argument> arguments;
-  for (const std::string& word : words) {
-    arguments.push_back(to_argument(word));
-  }
+  const auto arguments = mapped(words, to_argument);
   const auto target = tune_target(arguments);
   if (!target) {
     return target.error();

@@ -4,6 +4,7 @@
 #include "app/control/console_commands.h"
 #include "app/text.h"
 #include "core/model/language/expression.h"
+#include "core/ranges.h"
 
 namespace ressort::control {
 
@@ -56,10 +57,7 @@ Result<Done> command::shape(ConsoleContext& console, Words words) {
   if (!loaded(console)) {
     return nothing_loaded;
   }
-  std::vector<Argument> arguments;
-  for (const std::string& word : words) {
-    arguments.push_back(to_argument(word));
-  }
+  const auto arguments = mapped(words, to_argument);
   const auto targets = timbre_targets(arguments);
   if (!targets) {
     return targets.error();

@@ -11,6 +11,8 @@
 #include <filesystem>
 #include <string_view>
 
+#include "core/ranges.h"
+
 namespace ressort::plot {
 namespace {
 
@@ -91,11 +93,8 @@ std::string commands_of(const std::string& name, const Axis& axis, bool has_axes
     return text + "autofreq\nset format " + name +
            (axis.is_logarithmic ? " '10^{%T}'\n" : " '%g'\n");
   }
-  std::string all;
-  for (const Tick& tick : ticks) {
-    all += (all.empty() ? "" : ", ") + quoted(tick.text) + " " + number(tick.at);
-  }
-  return text + "(" + all + ") noenhanced\n";
+  const auto print = [](const Tick& tick) { return quoted(tick.text) + " " + number(tick.at); };
+  return text + "(" + joined(ticks, ", ", print) + ") noenhanced\n";
 }
 
 // Rectangle of a panel, in pixels from the figure's lower left corner.
@@ -310,11 +309,7 @@ std::string number(double value) {
 }
 
 std::string row(std::initializer_list<double> values) {
-  std::string line;
-  for (const double value : values) {
-    line += (line.empty() ? "" : " ") + number(value);
-  }
-  return line + "\n";
+  return joined(values, " ", number) + "\n";
 }
 
 std::string row(std::initializer_list<double> values, const std::string& text) {

@@ -14,6 +14,7 @@
 
 #include "app/exit_code.h"
 #include "app/text.h"
+#include "core/ranges.h"
 
 namespace ressort::session {
 namespace {
@@ -50,14 +51,6 @@ std::vector<fs::path> known_folders() {
 bool is_below(const fs::path& path, const fs::path& folder) {
   return std::mismatch(folder.begin(), folder.end(), path.begin(), path.end()).first ==
          folder.end();
-}
-
-std::string names_of_presets() {
-  std::string names;
-  for (const std::string& preset : known_presets()) {
-    names += (names.empty() ? "" : ", ") + preset;
-  }
-  return names;
 }
 
 // The program's names come first, so that program change numbers do not depend on the user's files.
@@ -232,7 +225,7 @@ Result<std::string> find_scene(const std::string& name, Reach reach) {
     return Error{"expected the name of a model or a preset"};
   }
   std::error_code error;
-  const std::string presets = names_of_presets();
+  const std::string presets = joined(known_presets(), ", ");
   if (reach == Reach::own_folders) {
     const std::string path = fs::path(name).is_relative() ? known_scene(name) : "";
     if (const auto found = own_file(path)) {

@@ -10,6 +10,7 @@
 #include "core/model/morph.h"
 #include "core/model/preset/fit.h"
 #include "core/model/tuning/scala.h"
+#include "core/ranges.h"
 
 namespace ressort::session {
 namespace {
@@ -421,10 +422,7 @@ class SceneReader {
       }
       stops.push_back(std::move(stop));
     }
-    std::vector<std::string> knobs;
-    for (const ParameterSetting& knob : preset.parameters) {
-      knobs.push_back(knob.name);
-    }
+    const auto knobs = mapped(preset.parameters, &ParameterSetting::name);
     auto network = morphed(model.network, stops, preset.morph_parameter, knobs);
     if (!network) {
       return failed<Scene>(network.error().line == 0 ? file.error(network.error().message, first)
@@ -635,11 +633,9 @@ Result<Scene> scene_of(Reading&& reading) {
   if (reading.scene) {
     return *std::move(reading.scene);
   }
-  std::string all;
-  for (const Finding& finding : reading.findings) {  // warnings too, as one may explain an error
-    all += (all.empty() ? "" : "\n") + to_string(finding);
-  }
-  return Error{std::move(all)};
+  // Warnings too, as one may explain an error.
+  return Error{
+      joined(reading.findings, "\n", [](const Finding& finding) { return to_string(finding); })};
 }
 
 }  // namespace ressort::session

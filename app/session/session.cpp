@@ -7,6 +7,7 @@
 
 #include "app/session/files.h"
 #include "app/session/modes/tuned_files.h"
+#include "core/ranges.h"
 
 namespace ressort::session {
 namespace {
@@ -140,10 +141,8 @@ Result<std::string> Session::save(const std::string& name, Existing existing) {
     }
     model = *kept;
   }
-  std::vector<std::string> through;
-  for (const BodyModel& body : current()->preset.bodies) {
-    through.push_back(model_name_elsewhere(body.file));
-  }
+  auto through = mapped(current()->preset.bodies,
+                        [](const BodyModel& body) { return model_name_elsewhere(body.file); });
   const auto text =
       current_.preset_text(model_name_elsewhere(model), options_.gain, std::move(through));
   if (!text) {
@@ -168,10 +167,8 @@ Result<std::string> Session::save_to(const std::string& folder) {
     const bool is_below = !place.empty() && *place.begin() != ".." && path != now->model_path;
     return is_below ? place : fs::path(path).filename();
   };
-  std::vector<std::string> through;
-  for (const BodyModel& body : now->preset.bodies) {
-    through.push_back(place_of(body.file).string());
-  }
+  auto through = mapped(now->preset.bodies,
+                        [&](const BodyModel& body) { return place_of(body.file).string(); });
   const auto text =
       current_.preset_text(place_of(now->model_path).string(), options_.gain, std::move(through));
   if (!text) {

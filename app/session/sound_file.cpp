@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "app/text.h"
+#include "core/ranges.h"
 
 namespace ressort::session {
 namespace {
@@ -73,13 +74,7 @@ int samples_of(SampleFormat format) {
 }  // namespace
 
 const std::vector<std::string_view>& sound_endings() {
-  static const std::vector<std::string_view> endings = [] {
-    std::vector<std::string_view> all;
-    for (const Kind& kind : kinds) {
-      all.push_back(kind.ending);
-    }
-    return all;
-  }();
+  static const std::vector<std::string_view> endings = mapped(kinds, &Kind::ending);
   return endings;
 }
 

@@ -10,6 +10,7 @@
 #include "app/text.h"
 #include "core/model/language/expression.h"
 #include "core/model/language/print.h"
+#include "core/ranges.h"
 
 namespace ressort::session {
 namespace {
@@ -22,11 +23,9 @@ TimedEvent parameter_event(const Loaded& loaded, std::size_t index, double value
 }
 
 std::string to_text(const std::vector<Setting>& settings) {
-  std::vector<std::string> words;
-  for (const Setting& setting : settings) {
-    words.push_back(setting.parameter + " = " + print_number(setting.value));
-  }
-  return joined(words, ", ");
+  return joined(settings, ", ", [](const Setting& setting) {
+    return setting.parameter + " = " + print_number(setting.value);
+  });
 }
 
 // Returns for example "controller 20, an encoder (offset),".
@@ -246,9 +245,7 @@ void Worker::reload() {
       news.news = done ? *done : done.error().message;
     } else {
       news.is_done = false;
-      for (const Finding& finding : reading.findings) {
-        news.news += (news.news.empty() ? "" : "\n") + with_source(finding);
-      }
+      news.news = joined(reading.findings, "\n", with_source);
     }
   } catch (const std::exception& error) {
     news.is_done = false;

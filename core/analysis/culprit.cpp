@@ -6,6 +6,7 @@
 
 #include "core/analysis/stability.h"
 #include "core/model/language/expression.h"
+#include "core/ranges.h"
 
 namespace ressort::analysis {
 namespace {
@@ -146,10 +147,7 @@ Culprit Stability::accuse(const Suspect& suspect, std::span<const Range> argumen
   }
   const ArgumentId argument = argument_of(suspect, arguments);
   if (argument != no_argument) {
-    std::vector<std::string> names;
-    for (const Parameter& parameter : network_.parameters) {
-      names.push_back(parameter.name);
-    }
+    const auto names = mapped(network_.parameters, &Parameter::name);
     culprit.argument = print_expression(network_.arguments[argument], names);
     const Range range = arguments[argument];
     const bool is_lowest =

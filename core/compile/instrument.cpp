@@ -11,6 +11,7 @@
 #include "core/curve.h"
 #include "core/model/preset/fit.h"
 #include "core/model/topology.h"
+#include "core/ranges.h"
 
 namespace ressort::compile {
 namespace {
@@ -75,11 +76,8 @@ Control make_control(const Network& network, const ControlSetting& setting) {
 }
 
 std::vector<Control> make_controls(const Network& network, const Preset& preset) {
-  std::vector<Control> controls;
-  for (const ControlSetting& setting : preset.controls) {
-    controls.push_back(make_control(network, setting));
-  }
-  return controls;
+  return mapped(preset.controls,
+                [&](const ControlSetting& setting) { return make_control(network, setting); });
 }
 
 std::vector<PlayedLfo> make_lfos(const Preset& preset) {

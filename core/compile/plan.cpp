@@ -6,6 +6,7 @@
 #include "core/compile/accuracy/springs.h"
 #include "core/kernels/modal/modal_body.h"
 #include "core/kernels/oversampled/oversampled_form.h"
+#include "core/ranges.h"
 
 namespace ressort::compile {
 namespace {
@@ -470,11 +471,7 @@ Planned make_plan(Machine machine, const Workload& load, std::optional<Method> m
 }
 
 std::vector<std::string> forms_of(const Plan& plan) {
-  std::vector<std::string> forms;
-  for (const Part& part : plan.parts) {
-    forms.push_back(part.form);
-  }
-  return forms;
+  return mapped(plan.parts, &Part::form);
 }
 
 std::optional<Accuracy> accuracy_of(const std::vector<Part>& parts) {

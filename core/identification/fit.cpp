@@ -7,6 +7,7 @@
 
 #include "core/linear_algebra/complex.h"
 #include "core/linear_algebra/eigen.h"
+#include "core/ranges.h"
 
 namespace ressort::identification {
 namespace {
@@ -125,11 +126,7 @@ Matrix beside(const Matrix& a, const Matrix& b) {
 }  // namespace
 
 std::vector<Complex> poles_of(std::span<const DampedMode> modes) {
-  std::vector<Complex> log_z;
-  for (const DampedMode& mode : modes) {
-    log_z.push_back(mode.log_z);
-  }
-  return log_z;
+  return mapped(modes, &DampedMode::log_z);
 }
 
 DampedFit::DampedFit(std::span<const std::vector<double>> sound)
@@ -142,10 +139,7 @@ void DampedFit::find_rest() {
     for (double& x : rest_[c]) {
       x -= constant_[c];
     }
-    std::vector<Complex> subtracted;
-    for (const DampedMode& mode : modes_) {
-      subtracted.push_back(-mode.c[c]);
-    }
+    const auto subtracted = mapped(modes_, [&](const DampedMode& mode) { return -mode.c[c]; });
     add_damped(rest_[c], subtracted, poles_of(modes_));
   }
 }

@@ -5,6 +5,7 @@
 #include <unordered_map>
 
 #include "core/model/index_table.h"
+#include "core/ranges.h"
 
 namespace ressort::model {
 namespace {
@@ -198,12 +199,7 @@ double level_value(const Network& network, const Output& output,
 }
 
 std::vector<double> parameter_values(const Network& network) {
-  std::vector<double> values;
-  values.reserve(network.parameters.size());
-  for (const Parameter& parameter : network.parameters) {
-    values.push_back(parameter.value);
-  }
-  return values;
+  return mapped(network.parameters, &Parameter::value);
 }
 
 double initial_velocity(const Network& network, const Mass& mass) {

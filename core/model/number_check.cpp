@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/model/language/expression.h"
+#include "core/ranges.h"
 
 namespace ressort::model {
 namespace {
@@ -153,10 +154,7 @@ class NumberCheck {
   // "the argument 1/P of 'r' is not finite when P = 0"
   std::string message(const Asked& asked, const std::string& name, std::string_view what) const {
     const Formula& formula = network_.arguments[asked.argument];
-    std::vector<std::string> names;
-    for (const Parameter& parameter : network_.parameters) {
-      names.push_back(parameter.name);
-    }
+    const auto names = mapped(network_.parameters, &Parameter::name);
     std::string values;
     for (std::size_t i = 0; i < names.size(); ++i) {
       if (std::ranges::any_of(formula, [&](const Step& step) {

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "core/linear_algebra/lanczos.h"
+#include "core/ranges.h"
 #include "core/solids/shell.h"
 
 namespace ressort::solids {
@@ -333,10 +334,7 @@ Result<Eigenpairs> lowest_solid_pairs(const SolidMesh& mesh, const SolidMatrices
   if (rows == 0) {
     return Error{"all of its nodes are clamped; make the clamps smaller"};
   }
-  std::vector<Point3> places;
-  for (const int node : matrices.node) {
-    places.push_back(mesh.points[at(node)]);
-  }
+  const auto places = mapped(matrices.node, [&](int node) { return mesh.points[at(node)]; });
   progress.stage("ordering its equations");
   FrontalCholesky factor(matrices.mass, places, progress);
   if (factor.size() > most_factor_elements) {

@@ -9,6 +9,8 @@
 #include <unordered_map>
 #include <utility>
 
+#include "core/ranges.h"
+
 namespace ressort::solids {
 namespace {
 
@@ -373,10 +375,7 @@ void keep_one_body(Surface& surface, Parts& parts, const std::vector<Triangle>& 
   for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
     alone[at(parts.part[t])].triangles.push_back(surface.triangles[t]);
   }
-  std::vector<double> volume;
-  for (const Surface& part : alone) {
-    volume.push_back(six_volumes(part));
-  }
+  const auto volume = mapped(alone, [](const Surface& part) { return six_volumes(part); });
   const auto outer = static_cast<std::size_t>(
       std::ranges::max_element(volume,
                                [](double a, double b) { return std::abs(a) < std::abs(b); }) -

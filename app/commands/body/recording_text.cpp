@@ -10,6 +10,7 @@
 #include "app/text.h"
 #include "core/identification/shapes.h"
 #include "core/model/language/expression.h"
+#include "core/ranges.h"
 
 namespace ressort::commands {
 namespace {
@@ -89,11 +90,9 @@ std::string header(const Identification& found, const std::string& source) {
 
 std::string choices_of(const Identification& found, const std::string& before,
                        const std::string& after) {
-  std::string text;
-  for (const Unexplained& choice : found.choices) {
-    text += (text.empty() ? "" : ", ") + std::to_string(choice.modes) + " modes " +
-            number("%.1f", choice.residual_db) + " dB";
-  }
+  const std::string text = joined(found.choices, ", ", [](const Unexplained& choice) {
+    return std::to_string(choice.modes) + " modes " + number("%.1f", choice.residual_db) + " dB";
+  });
   return text.empty() ? text
                       : before + "Residual of the best modes (--modes): " + text + "." + after;
 }

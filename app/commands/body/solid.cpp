@@ -16,6 +16,7 @@
 #include "app/realtime/lockfree.h"
 #include "app/session/files.h"
 #include "app/text.h"
+#include "core/ranges.h"
 #include "core/solids/shell.h"
 
 namespace ressort::commands {
@@ -81,10 +82,8 @@ Result<MaterialChoice> choose_material(const SolidBodyOptions& options) {
   if (!options.material.empty()) {
     const auto known = solid_material(lower(options.material));
     if (!known) {
-      std::vector<std::string> names;
-      for (const SolidMaterial& row : solid_materials()) {
-        names.emplace_back(row.name);
-      }
+      const auto names =
+          mapped(solid_materials(), [](const SolidMaterial& row) { return std::string(row.name); });
       return Error{"unknown material '" + options.material + "'" +
                    did_you_mean(options.material, names) + "; known are " + joined(names, ", ")};
     }

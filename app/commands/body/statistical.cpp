@@ -11,6 +11,7 @@
 #include "app/session/files.h"
 #include "app/text.h"
 #include "core/model/language/expression.h"
+#include "core/ranges.h"
 
 namespace ressort::commands {
 namespace {
@@ -19,12 +20,9 @@ constexpr double least_curve_hz = 1.0;
 constexpr double most_curve_hz = 20000.0;
 
 std::string curve_text(const std::vector<CurvePoint>& curve) {
-  std::string text;
-  for (const CurvePoint& point : curve) {
-    text += (text.empty() ? "" : ",") + (curve.size() == 1 ? "" : print_number(point[0]) + ":") +
-            print_number(point[1]);
-  }
-  return text;
+  return joined(curve, ",", [&](const CurvePoint& point) {
+    return (curve.size() == 1 ? "" : print_number(point[0]) + ":") + print_number(point[1]);
+  });
 }
 
 // Returns the command that writes the same modes, as lines of comment.
@@ -41,12 +39,7 @@ std::string command_text(const StatisticalBodyOptions& options) {
     while (numbers.size() > 2 && numbers.size() < 5 && numbers.back() == 1.0) {
       numbers.pop_back();
     }
-    std::string word = "--mode";
-    char before = ' ';
-    for (const double number : numbers) {
-      word += std::exchange(before, ',') + print_number(number);
-    }
-    words.push_back(word);
+    words.push_back("--mode " + joined(numbers, ",", print_number));
   }
   if (!body.radiation.empty()) {
     words.push_back("--radiation " + curve_text(body.radiation));

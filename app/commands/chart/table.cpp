@@ -82,13 +82,15 @@ std::string chart_csv(const std::vector<ChartSheet>& sheets, const std::string& 
   text += meaning;
   for (const ChartSheet& sheet : sheets) {
     for (const ChartRow& row : sheet.rows) {
-      text += joined({sheet.scene, cell(row.way.name), precision_name(row.way.precision),
+      text += joined(
+                  std::vector<std::string>{
+                      sheet.scene, cell(row.way.name), precision_name(row.way.precision),
                       row.methods, std::to_string(row.way.oversampling), cell(row.way.budget),
                       cell(row.ns), cell(1e9 / 48000.0 / row.ns), cell(row.snr_db[published]),
                       cell(row.snr_db[physical]), row.is_on_front[published] ? "1" : "0",
                       row.is_on_front[physical] ? "1" : "0", cell(row.failure),
                       cell(joined(row.twins, "; "))},
-                     ",") +
+                  ",") +
               "\n";
     }
   }

@@ -29,6 +29,7 @@
 #include "app/session/timing.h"
 #include "app/session/wisdom.h"
 #include "app/text.h"
+#include "core/ranges.h"
 
 namespace ressort::commands {
 namespace {
@@ -223,11 +224,9 @@ class Player {
     if (read.ok()) {
       return std::move(read.rows);
     }
-    std::vector<std::string> lines;
-    for (const Error& wrong : read.errors) {
-      lines.push_back(with_source(finding_of(path, *text, wrong)));
-    }
-    return Error{joined(lines, "\n")};
+    return Error{joined(read.errors, "\n", [&](const Error& wrong) {
+      return with_source(finding_of(path, *text, wrong));
+    })};
   }
 
   int open_device() {

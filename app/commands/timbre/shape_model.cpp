@@ -20,6 +20,7 @@
 #include "app/session/new_file.h"
 #include "app/session/timbre/shape.h"
 #include "core/model/preset/edit.h"
+#include "core/ranges.h"
 
 namespace ressort::commands {
 namespace {
@@ -216,10 +217,7 @@ int shape_model(const ShapeOptions& options, const std::function<bool()>& should
   if (like.f0_hz && !has_keys && !is_asked(TargetFigure::f0)) {
     targets.push_back({TargetFigure::f0, *like.f0_hz});
   }
-  std::vector<double> before;
-  for (const ParameterInfo& info : instrument.parameters) {
-    before.push_back(info.value);
-  }
+  const auto before = mapped(instrument.parameters, &ParameterInfo::value);
   std::optional<ProgressBar> bar(true);
   const auto shaped = shape_timbre(
       {.scene = *scene,

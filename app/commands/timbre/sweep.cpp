@@ -13,6 +13,7 @@
 #include "app/text.h"
 #include "core/curve.h"
 #include "core/model/language/expression.h"
+#include "core/ranges.h"
 
 namespace ressort::commands {
 namespace {
@@ -141,18 +142,13 @@ Result<FigureLaw> parse_law(const std::string& text) {
 }
 
 std::string to_csv(const SweepTable& table, const std::vector<SweptParameter>& swept) {
-  std::string text;
-  for (const SweptParameter& one : swept) {
-    text += (text.empty() ? "" : ",") + one.name;
-  }
+  std::string text = joined(swept, ",", &SweptParameter::name);
   for (const std::string& name : table.names) {
     text += "," + name;
   }
   text += "\n";
   for (const SweepRow& row : table.rows) {
-    for (std::size_t i = 0; i < row.at.size(); ++i) {
-      text += (i > 0 ? "," : "") + print_number(row.at[i]);
-    }
+    text += joined(row.at, ",", print_number);
     for (const std::optional<double>& value : row.figures) {
       text += "," + (value && std::isfinite(*value) ? print_number(*value) : std::string());
     }

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/model/language/expression.h"
+#include "core/ranges.h"
 
 namespace ressort::control {
 
@@ -52,11 +53,7 @@ bool OscClient::may_have_rows(const std::string& about) const {
 }
 
 void OscClient::answer_rows(const std::vector<Reply>& rows) const {
-  std::vector<OscOutlet::Bytes> bytes;
-  for (const Reply& row : rows) {
-    bytes.push_back(row.bytes());
-  }
-  send(std::move(bytes));
+  send(mapped(rows, &Reply::bytes));
 }
 
 }  // namespace ressort::control

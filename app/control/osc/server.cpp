@@ -26,6 +26,7 @@
 #include "app/realtime/rate_limit.h"
 #include "app/text.h"
 #include "core/model/language/expression.h"
+#include "core/ranges.h"
 
 namespace ressort::control {
 namespace {
@@ -373,10 +374,7 @@ bool OscServer::listens_on_udp() const {
 }
 
 std::string OscServer::access() const {
-  std::string others;
-  for (const Subnet& subnet : server_->allowed) {
-    others += (others.empty() ? "" : ", ") + print_subnet(subnet);
-  }
+  const std::string others = joined(server_->allowed, ", ", print_subnet);
   return others.empty() ? "accessible from this machine only"
                         : "accessible from this machine and " + others;
 }

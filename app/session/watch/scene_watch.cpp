@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "app/session/files.h"
+#include "core/ranges.h"
 
 namespace ressort::session {
 
@@ -17,11 +18,7 @@ void SceneWatch::follow(const std::vector<SceneFile>& files) {
   if (!watch_) {
     return;
   }
-  std::vector<std::string> paths;
-  for (const SceneFile& file : files) {
-    paths.push_back(file.path);
-  }
-  if (!watch_->follow(paths)) {
+  if (!watch_->follow(mapped(files, &SceneFile::path))) {
     return;
   }
   was_edited_ = std::ranges::any_of(files, [](const SceneFile& file) {

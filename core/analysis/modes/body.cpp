@@ -8,6 +8,7 @@
 #include "core/analysis/places.h"
 #include "core/linear_algebra/matrix.h"
 #include "core/model/language/expression.h"
+#include "core/ranges.h"
 
 namespace ressort::analysis {
 namespace {
@@ -193,11 +194,8 @@ PlacedModes placed_modes(const NetworkModes& modes) {
 }
 
 std::string body_text(const PlacedModes& modes) {
-  std::string text = "@" + modes.name + " body " + print_number(modes.mass);
-  for (const std::string& place : modes.places) {
-    text += " " + place;
-  }
-  text += "\n";
+  std::string text = "@" + modes.name + " body " + print_number(modes.mass) + " " +
+                     joined(modes.places, " ") + "\n";
   for (std::size_t i = 0; i < modes.modes.size(); ++i) {
     const PlacedMode& mode = modes.modes[i];
     text += "@" + modes.name + std::to_string(i + 1) + " mode @" + modes.name + " " +
@@ -215,11 +213,8 @@ Result<ModalChain> chain_of(const PlacedModes& modes, std::string_view place) {
   constexpr double rate_hz = Network::reference_rate_hz;
   const auto at = std::ranges::find(modes.places, place);
   if (at == modes.places.end()) {
-    std::string known;
-    for (const std::string& name : modes.places) {
-      known += (known.empty() ? "" : ", ") + name;
-    }
-    return Error{"there is no place '" + std::string(place) + "'; there are " + known};
+    return Error{"there is no place '" + std::string(place) + "'; there are " +
+                 joined(modes.places, ", ")};
   }
   const auto column = static_cast<std::size_t>(at - modes.places.begin());
   double most = 0.0;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/ranges.h"
+
 namespace ressort::analysis {
 namespace {
 
@@ -45,10 +47,7 @@ KnownShapes::KnownShapes(NetworkModes modes, std::vector<std::size_t> pushed, Mo
 
 // Returns the excited inputs, then the mean of all outputs.
 std::vector<ModalPort> KnownShapes::ports_of(const LinearSystem& system) const {
-  std::vector<ModalPort> ports;
-  for (const std::size_t input : pushed_) {
-    ports.push_back(system.inputs[input]);
-  }
+  auto ports = mapped(pushed_, [&](std::size_t input) { return system.inputs[input]; });
   ModalPort& heard = ports.emplace_back();
   const auto add = [&](ModalPort::Shares& to, const ModalPort::Shares& from) {
     for (const auto& [row, share] : from) {

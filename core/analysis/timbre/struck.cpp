@@ -11,6 +11,7 @@
 #include "core/analysis/timbre/envelope.h"
 #include "core/model/topology.h"
 #include "core/raised_cosine.h"
+#include "core/ranges.h"
 
 namespace ressort::analysis {
 namespace {
@@ -151,11 +152,7 @@ Result<std::vector<HeardMode>> StruckModel::modes_at(std::span<const double> par
 }
 
 std::vector<std::size_t> StruckModel::pushed() const {
-  std::vector<std::size_t> inputs;
-  for (const StrikePulse& blow : options_.blows) {
-    inputs.push_back(blow.input);
-  }
-  return inputs;
+  return mapped(options_.blows, &StrikePulse::input);
 }
 
 Result<StruckModel::Tuned> StruckModel::tuned(std::span<const double> parameters) {

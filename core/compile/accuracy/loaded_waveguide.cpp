@@ -9,6 +9,7 @@
 #include "core/compile/accuracy/springs.h"
 #include "core/kernels/waveguides/rails.h"
 #include "core/linear_algebra/complex.h"
+#include "core/ranges.h"
 
 namespace ressort::compile {
 namespace {
@@ -84,11 +85,9 @@ class LoadedWaveguide final : public TunedMotion {
 
  private:
   std::vector<double> values_at(double factor) const {
-    std::vector<double> values;
-    for (const Coefficient& coefficient : program_.coefficients) {
-      values.push_back(coefficient_value(program_, coefficient, parameters_, factor));
-    }
-    return values;
+    return mapped(program_.coefficients, [&](const Coefficient& coefficient) {
+      return coefficient_value(program_, coefficient, parameters_, factor);
+    });
   }
   WaveguideDesign design_of(const WaveguideSlot& slot, const std::vector<double>& value) const {
     return design_waveguide({.frequency_hz = value[slot.frequency],

@@ -6,6 +6,7 @@
 #include "core/kernels/taps.h"
 #include "core/laws/law.h"
 #include "core/linear_algebra/eigen.h"
+#include "core/ranges.h"
 
 namespace ressort::compile {
 namespace {
@@ -22,11 +23,9 @@ bool is_place(const Program& program, std::uint32_t node) {
 std::vector<double> values_of(const Program& program, std::span<const double> parameters,
                               double stiffness_factor, bool is_sampled = false) {
   const auto value = is_sampled ? sampled_value : continuous_value;
-  std::vector<double> values;
-  for (const Coefficient& coefficient : program.coefficients) {
-    values.push_back(value(program, coefficient, parameters, stiffness_factor));
-  }
-  return values;
+  return mapped(program.coefficients, [&](const Coefficient& coefficient) {
+    return value(program, coefficient, parameters, stiffness_factor);
+  });
 }
 
 // Returns the [moving node] root of the inverse mass.

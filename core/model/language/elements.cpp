@@ -8,6 +8,7 @@
 #include "core/model/language/expression.h"
 #include "core/model/language/reader.h"
 #include "core/model/topology.h"
+#include "core/ranges.h"
 
 namespace ressort::model {
 namespace {
@@ -430,13 +431,9 @@ std::optional<std::uint32_t> Reader::named_place(const Line& line, const Token& 
   const auto place = place_called(body, name);
   if (!place && std::ranges::find(parameter_names_, name.text) == parameter_names_.end()) {
     const std::vector<std::string_view> names(body.places.begin(), body.places.end());
-    std::string all;
-    for (const std::string& other : body.places) {
-      all += (all.empty() ? "" : ", ") + other;
-    }
     error(line, name,
           "the body '@" + body.name + "' has no place called " + quoted(name.text) + " (it has " +
-              all + ")" + suggestion(name.text, names));
+              joined(body.places, ", ") + ")" + suggestion(name.text, names));
     return std::nullopt;
   }
   ArgumentId u = no_argument;

@@ -6,6 +6,7 @@
 #include "core/model/language/expression.h"
 #include "core/model/language/reader.h"
 #include "core/model/topology.h"
+#include "core/ranges.h"
 
 namespace ressort::model {
 
@@ -171,14 +172,11 @@ void Reader::add_mode(const Line& line) {
   Macro& body = out_.network.macros[*index];
   const std::size_t given = line.rest.size() - 3;
   if (given != body.places.size()) {
-    std::string places;
-    for (const std::string& place : body.places) {
-      places += (places.empty() ? "" : " ") + place;
-    }
     return error(line, line.rest[std::min(line.rest.size() - 1, 3 + body.places.size())],
                  "the body " + quoted(label.text) + " has " + std::to_string(body.places.size()) +
-                     (body.places.size() == 1 ? " place (" : " places (") + places +
-                     "), so a mode needs as many displacements; found " + std::to_string(given));
+                     (body.places.size() == 1 ? " place (" : " places (") +
+                     joined(body.places, " ") + "), so a mode needs as many displacements; found " +
+                     std::to_string(given));
   }
   if (++nodes_ > most_nodes_) {
     return error(line, line.label,

@@ -5,6 +5,7 @@
 #include "core/model/language/expression.h"
 #include "core/model/language/reader.h"
 #include "core/model/language/synth_a_modeler.h"
+#include "core/ranges.h"
 
 namespace ressort::model {
 
@@ -111,10 +112,7 @@ void Reader::read_line(std::string_view text, int number) {
   const auto found = std::find_if(keywords().begin(), keywords().end(),
                                   [&](const Keyword& k) { return k.word == word.text; });
   if (found == keywords().end()) {
-    std::vector<std::string_view> words;
-    for (const Keyword& keyword : keywords()) {
-      words.push_back(keyword.word);
-    }
+    const auto words = mapped(keywords(), &Keyword::word);
     return error(line, word, "unknown keyword " + quoted(word.text) + suggestion(word.text, words));
   }
   entries_.push_back({.at = static_cast<std::uint32_t>(text.data() - text_.data()),

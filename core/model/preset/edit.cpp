@@ -4,6 +4,7 @@
 
 #include "core/model/language/expression.h"
 #include "core/model/preset/toml.h"
+#include "core/ranges.h"
 
 namespace ressort::model {
 
@@ -219,10 +220,7 @@ std::string print_preset(const Preset& preset) {
   text += preset.damper_s != usual.damper_s ? "damper_s = " + in_toml(preset.damper_s) + "\n" : "";
   text += preset.noise ? "noise = true\n" : "";
   text += preset.keyboard ? "" : "tuning = \"fixed\"\n";
-  std::string fixed;
-  for (const std::string& label : preset.fixed) {
-    fixed += (fixed.empty() ? "" : ", ") + in_quotes(label);
-  }
+  const std::string fixed = joined(preset.fixed, ", ", in_quotes);
   text += fixed.empty() ? "" : "fixed = [" + fixed + "]\n";
   text += preset.transpose != 0 ? "transpose = " + std::to_string(preset.transpose) + "\n" : "";
   if (!preset.parameters.empty()) {

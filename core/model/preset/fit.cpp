@@ -7,15 +7,13 @@
 
 #include "core/laws/law.h"
 #include "core/model/language/tokens.h"
+#include "core/ranges.h"
 
 namespace ressort::model {
 namespace {
 
 std::string names(const Network& network) {
-  std::string text;
-  for (const Parameter& parameter : network.parameters) {
-    text += (text.empty() ? "" : ", ") + parameter.name;
-  }
+  const std::string text = joined(network.parameters, ", ", &Parameter::name);
   return text.empty() ? "none" : text;
 }
 
