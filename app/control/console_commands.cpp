@@ -18,6 +18,14 @@ namespace ressort::control {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+const Error nothing_loaded{
+    "no model is loaded yet; 'models' lists them, 'load NAME' "
+    "loads one"};
+
+}  // namespace
+
 std::shared_ptr<const Loaded> loaded(const ConsoleContext& console) {
   auto current = console.session.current();
   return current->serial != 0 ? current : nullptr;
@@ -25,15 +33,11 @@ std::shared_ptr<const Loaded> loaded(const ConsoleContext& console) {
 
 // --- playing ------------------------------------------------------------------------------------
 
-const Error nothing_loaded{
-    "no model is loaded yet; 'models' lists them, 'load NAME' "
-    "loads one"};
-
 Result<std::vector<Event>> play(ConsoleContext& console, const Message& message) {
-  if (!loaded(console)) {
+  const auto current = loaded(console);
+  if (!current) {
     return nothing_loaded;
   }
-  const auto current = console.session.current();
   auto events = to_events(message, current->instrument, current->serial);
   if (!events) {
     Error error = events.error();
@@ -122,6 +126,9 @@ Result<Done> play_words(ConsoleContext& console, const Row& row, Words words) {
 }  // namespace
 
 Result<Done> run_command(ConsoleContext& console, const Row& row, Words words) {
+  if (row.needs_scene && !loaded(console)) {
+    return nothing_loaded;
+  }
   return row.act != nullptr ? row.act(console, words) : play_words(console, row, words);
 }
 
@@ -244,10 +251,7 @@ Result<Done> command::presets(ConsoleContext& console, Words) {
 }
 
 Result<Done> command::control(ConsoleContext& console, Words words) {
-  const auto current = loaded(console);
-  if (!current) {
-    return nothing_loaded;
-  }
+  const auto current = console.session.current();
   const auto& knobs = current->instrument.knobs;
   const auto meant = std::ranges::find_if(knobs, [&](const KnobInfo& knob) {
     return !words.empty() && same_but_case(knob.word, words[0]);
@@ -278,10 +282,7 @@ Result<Done> command::control(ConsoleContext& console, Words words) {
 }
 
 Result<Done> command::params(ConsoleContext& console, Words) {
-  const auto current = loaded(console);
-  if (!current) {
-    return nothing_loaded;
-  }
+  const auto current = console.session.current();
   const bool is_proved = current->instrument.verdict == Verdict::stable;
   std::vector<std::vector<std::string>> rows;
   for (const ParameterInfo& info : current->instrument.parameters) {
@@ -296,10 +297,7 @@ Result<Done> command::params(ConsoleContext& console, Words) {
 }
 
 Result<Done> command::get(ConsoleContext& console, Words words) {
-  const auto current = loaded(console);
-  if (!current) {
-    return nothing_loaded;
-  }
+  const auto current = console.session.current();
   std::vector<std::string> found;
   std::vector<std::string> names;
   const std::string meant = meant_parameter(current->instrument, words[0]);
@@ -319,10 +317,7 @@ Result<Done> command::get(ConsoleContext& console, Words words) {
 }
 
 Result<Done> command::set(ConsoleContext& console, Words words) {
-  const auto current = loaded(console);
-  if (!current) {
-    return nothing_loaded;
-  }
+  const auto current = console.session.current();
   const std::string meant = meant_parameter(current->instrument, words[0]);
   const Message message{"/param/" + meant, {to_argument(words[1])}};
   const auto events = play(console, message);
@@ -477,10 +472,7 @@ Result<Done> command::status(ConsoleContext& console, Words) {
 }
 
 Result<Done> command::explain(ConsoleContext& console, Words) {
-  const auto current = loaded(console);
-  if (!current) {
-    return nothing_loaded;
-  }
+  const auto current = console.session.current();
   const Instrument& instrument = current->instrument;
   std::vector<std::vector<std::string>> rows = {
       {"model", current->model_path},
@@ -506,10 +498,7 @@ Result<Done> command::explain(ConsoleContext& console, Words) {
 }
 
 Result<Done> command::tuning(ConsoleContext& console, Words words) {
-  const auto current = loaded(console);
-  if (!current) {
-    return nothing_loaded;
-  }
+  const auto current = console.session.current();
   std::vector<TimedEvent> events;
   if (words[0] == "off" && words.size() == 1) {
     events.push_back({.event = {.kind = EventKind::tuning_reset}});

@@ -24,8 +24,6 @@ struct ConsoleContext {
 // Returns the current scene; null before the first load.
 std::shared_ptr<const Loaded> loaded(const ConsoleContext& console);
 
-extern const Error nothing_loaded;
-
 // Sends a playing message to the audio thread; all of its events act together.
 Result<std::vector<Event>> play(ConsoleContext& console, const Message& message);
 

@@ -20,9 +20,6 @@ std::string meant_target(const Instrument& instrument, const std::string& word) 
 }  // namespace
 
 Result<Done> command::save(ConsoleContext& console, Words words) {
-  if (!loaded(console)) {
-    return nothing_loaded;
-  }
   const Existing existing = words.size() > 1 ? Existing::replace : Existing::refuse;
   const auto path = console.session.save(words[0], existing);
   if (!path) {
@@ -46,10 +43,7 @@ Result<Done> command::flight(ConsoleContext& console, Words words) {
 }
 
 Result<Done> command::learn(ConsoleContext& console, Words words) {
-  const auto current = loaded(console);
-  if (!current) {
-    return nothing_loaded;
-  }
+  const auto current = console.session.current();
   const std::string target = meant_target(current->instrument, words[0]);
   if (auto begun = console.session.learn(target); !begun) {
     return begun.error();
@@ -59,10 +53,7 @@ Result<Done> command::learn(ConsoleContext& console, Words words) {
 }
 
 Result<Done> command::unlearn(ConsoleContext& console, Words words) {
-  const auto current = loaded(console);
-  if (!current) {
-    return nothing_loaded;
-  }
+  const auto current = console.session.current();
   const std::string target = words.empty() ? "" : meant_target(current->instrument, words[0]);
   const auto count = console.session.unlearn(target);
   if (!count) {

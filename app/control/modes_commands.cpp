@@ -9,9 +9,6 @@
 namespace ressort::control {
 
 Result<Done> command::modes(ConsoleContext& console, Words words) {
-  if (!loaded(console)) {
-    return nothing_loaded;
-  }
   const auto count = mode_count(words.empty() ? Argument(32.0) : to_argument(words[0]));
   if (!count) {
     return count.error();
@@ -27,9 +24,6 @@ Result<Done> command::modes(ConsoleContext& console, Words words) {
 }
 
 Result<Done> command::tune(ConsoleContext& console, Words words) {
-  if (!loaded(console)) {
-    return nothing_loaded;
-  }
   const auto arguments = mapped(words, to_argument);
   const auto target = tune_target(arguments);
   if (!target) {

@@ -75,6 +75,7 @@ struct Row {
   std::string words = {};
   std::string_view command_does = {};  // Help text of the command, one line; empty: same as `does`.
   std::string_view details = {};       // Further lines of help.
+  bool needs_scene = false;            // An error until a scene is loaded.
   // Executes the command: prints its output or returns an error. The number of words has been
   // checked. Null: it plays. [console]
   Result<Done> (*act)(ConsoleContext& console, Words words) = nullptr;

@@ -241,12 +241,14 @@ std::vector<Row> make_rows() {
       {.command = "params",
        .group = CommandGroup::parameters,
        .command_does = "lists the parameters, their values and ranges",
+       .needs_scene = true,
        .act = command::params},
       {.command = "get",
        .group = CommandGroup::parameters,
        .words = "PARAMETER",
        .command_does = "prints a parameter's value",
        .details = "PARAMETER may be a pattern: 'get m_*' prints all that begin with m_.",
+       .needs_scene = true,
        .act = command::get},
       {.address = "/param/NAME",
        .arguments = {{"VALUE", "the value"}},
@@ -258,6 +260,7 @@ std::vector<Row> make_rows() {
        .words = "PARAMETER VALUE",
        .command_does = "sets a parameter, limited to its range",
        .details = "PARAMETER may be a pattern: 'set *_Z 0.001' sets all that end with _Z.",
+       .needs_scene = true,
        .act = command::set},
       {.address = "/control/NAME",
        .arguments = {{"VALUE", "the value", 0, 1}},
@@ -270,6 +273,7 @@ std::vector<Row> make_rows() {
        .command_does = "moves a named control, 0 to 1; alone, lists the controls",
        .details = "Every preset has its own, such as brightness and ring. 'control ring 0.8' is "
                   "the same as moving\nthe MIDI controller of that name.",
+       .needs_scene = true,
        .act = command::control},
       {.address = "/learn",
        .arguments = {{.word = "TARGET", .is_text = true}},
@@ -285,6 +289,7 @@ std::vector<Row> make_rows() {
            "address of\nthe preset, such as /finger. The knob loses its other function until "
            "'unlearn', in every preset\nthat has this target. The mapping of controllers keeps the "
            "assignment for the next start.",
+       .needs_scene = true,
        .act = command::learn},
       {.address = "/unlearn",
        .arguments = {{.word = "TARGET", .is_text = true}},
@@ -294,6 +299,7 @@ std::vector<Row> make_rows() {
        .group = CommandGroup::parameters,
        .words = "[CONTROL|PARAMETER]",
        .command_does = "ends the assignment of a knob, or of all knobs learned since the start",
+       .needs_scene = true,
        .act = command::unlearn},
       {.command = "undo",
        .group = CommandGroup::parameters,
@@ -400,6 +406,7 @@ std::vector<Row> make_rows() {
            "Writes parameter values to NAME.toml in your preset folder, "
            "\n$XDG_DATA_HOME/ressort/presets or ~/.local/share/ressort/presets. 'load NAME' loads "
            "it. --force\noverwrites an existing preset.",
+       .needs_scene = true,
        .act = command::save},
       {.command = "presets",
        .group = CommandGroup::models,
@@ -421,6 +428,7 @@ std::vector<Row> make_rows() {
       {.command = "explain",
        .group = CommandGroup::looking,
        .command_does = "shows how the model is computed and which controls it has",
+       .needs_scene = true,
        .act = command::explain},
       {.address = "/modes",
        .arguments = {{"COUNT", "how many modes", 1, 10000, 32}},
@@ -433,6 +441,7 @@ std::vector<Row> make_rows() {
        .command_does = "lists the lowest modes: frequency, note, T60 and level",
        .details = "Levels are in dB below the loudest mode. The modes are those of the current "
                   "parameters at the pitch\nwritten in the model.",
+       .needs_scene = true,
        .act = command::modes},
       {.address = "/timbre",
        .arguments = {{"SECONDS", "the seconds", 0, Subscribers::longest_lease_s, 10}, port},
@@ -447,6 +456,7 @@ std::vector<Row> make_rows() {
            "Analyses the last frame of 2048 samples, the mean of all outputs. Repeated, it also "
            "prints what\nhas changed: brighter, hollower, steadier. 'ressort describe' analyses "
            "recordings.",
+       .needs_scene = true,
        .act = command::timbre},
       {.address = "/tune",
        .arguments = {{"MODE", "the mode", 1, 10000},
@@ -461,6 +471,7 @@ std::vector<Row> make_rows() {
            "Scales the stiffness, and with a T60 in seconds the damping, of the whole model, or "
            "of the part\nconnected to the mass, string, mesh or link PART. 'modes' lists "
            "the modes, 'undo' reverts the\nchange, 'save NAME' saves it.",
+       .needs_scene = true,
        .act = command::tune},
       {.address = "/timbre/target",
        .arguments = {{.word = "FIGURE VALUE ...", .is_text = true}},
@@ -476,6 +487,7 @@ std::vector<Row> make_rows() {
            "odd_to_even, or f0\nin Hz if keys do not set the pitch, for a strike at the last "
            "key played. Parameters stay within\ntheir ranges. 'undo' reverts the change, 'save "
            "NAME' saves it, 'timbre' describes the sound.",
+       .needs_scene = true,
        .act = command::shape},
       {.address = "/subscribe",
        .arguments = {{"SECONDS", "the seconds", 0, Subscribers::longest_lease_s, 10}, port},
@@ -503,6 +515,7 @@ std::vector<Row> make_rows() {
        .details =
            "TUNING is a scale, NAME.scl, a keyboard map, NAME.kbm, or both. Sounding notes change "
            "at once;\nmodels loaded later keep the tuning.",
+       .needs_scene = true,
        .act = command::tuning},
       {.command = "rec",
        .words = "FILE|stop [--force]",

@@ -11,9 +11,6 @@ namespace ressort::control {
 Result<Done> command::timbre(ConsoleContext& console, Words) {
   constexpr std::chrono::milliseconds patience{20};
   constexpr int rounds = 60;  // A little over a second; the analysis needs 0.2 s.
-  if (!loaded(console)) {
-    return nothing_loaded;
-  }
   TimbreWatch& watch = console.session.timbre();
   // Keeps listening for a while, because users ask repeatedly.
   watch.listen(std::chrono::seconds(10));
@@ -54,9 +51,6 @@ Result<std::vector<TimbreTarget>> timbre_targets(std::span<const Argument> argum
 }
 
 Result<Done> command::shape(ConsoleContext& console, Words words) {
-  if (!loaded(console)) {
-    return nothing_loaded;
-  }
   const auto arguments = mapped(words, to_argument);
   const auto targets = timbre_targets(arguments);
   if (!targets) {
