@@ -105,7 +105,7 @@ judge() {
         target = what
         if (match(target, /^(core|app)\/[^\/]*\//)) {
           target = substr(target, 1, RLENGTH - 1)
-        } else if (target ~ /^core\/(rooms|ranges|result|formula|progress|groups|lanes|curve|sampled_mode|waveguide_places|raised_cosine|gesture|stroke|input_driver|random|noise|lfo|controller|knob_range|midi_number)[.]h$/) {
+        } else if (target ~ /^core\/(rooms|ranges|format|result|formula|progress|groups|lanes|curve|sampled_mode|waveguide_places|raised_cosine|gesture|stroke|input_driver|random|noise|lfo|controller|knob_range|midi_number)[.]h$/) {
           target = "core"
         } else if (target ~ /^app\/[^\/]*$/) {
           target = "app"

@@ -13,6 +13,7 @@
 #include "app/commands/progress_bar.h"
 #include "app/session/load_progress.h"
 #include "app/session/problem_reports.h"
+#include "core/format.h"
 
 namespace ressort::commands {
 namespace {
@@ -23,10 +24,8 @@ std::string db(double factor) {
   if (factor <= 0.0) {
     return "silent";
   }
-  char text[32];
   const double level = 20.0 * std::log10(factor);
-  std::snprintf(text, sizeof text, "%.1f dBFS", level > -0.05 && level < 0.0 ? 0.0 : level);
-  return text;
+  return formatted("%.1f dBFS", level > -0.05 && level < 0.0 ? 0.0 : level);
 }
 
 // Lets a signal stop the render, and a second signal the program.

@@ -1,11 +1,10 @@
 #include "app/control/status.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 
 #include "app/text.h"
+#include "core/format.h"
 #include "core/model/language/expression.h"
 
 namespace ressort::control {
@@ -13,9 +12,7 @@ namespace {
 
 // Formats a number with three digits.
 std::string about(double number) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.3g", number);
-  return text.data();
+  return formatted("%.3g", number);
 }
 
 std::string percent(double share, int digits) {

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <string>
 #include <vector>
 
 #include "core/engine/voices.h"
+#include "core/format.h"
 #include "core/kernels/passive/clusters.h"
 #include "core/kernels/registry.h"
 #include "core/kernels/threads/executor.h"
@@ -15,11 +15,8 @@ namespace ressort::compile {
 namespace {
 
 std::string in_bytes(std::uint64_t bytes) {
-  char text[32];
   const double mega = static_cast<double>(bytes) / 1e6;
-  std::snprintf(text, sizeof text, mega < 1e3 ? "%.0f MB" : "%.1f GB",
-                mega < 1e3 ? mega : mega / 1e3);
-  return text;
+  return mega < 1e3 ? formatted("%.0f MB", mega) : formatted("%.1f GB", mega / 1e3);
 }
 
 }  // namespace

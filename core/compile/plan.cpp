@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/compile/accuracy/springs.h"
+#include "core/format.h"
 #include "core/kernels/modal/modal_body.h"
 #include "core/kernels/oversampled/oversampled_form.h"
 #include "core/ranges.h"
@@ -18,15 +19,11 @@ constexpr double most_behind = 4.0;
 constexpr double least_gain = 1.0 / 0.9;
 
 std::string in_ns(double ns) {
-  char text[32];
-  std::snprintf(text, sizeof text, ns < 9.95 ? "%.1f ns" : "%.0f ns", ns);
-  return text;
+  return formatted(ns < 9.95 ? "%.1f ns" : "%.0f ns", ns);
 }
 
 std::string rounded(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
+  return formatted("%.3g", value);
 }
 
 // Returns whether all oscillators are modes of bodies, and all links passive. Every form samples

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+
+#include "core/format.h"
 
 namespace ressort::identification {
 namespace {
@@ -26,9 +27,7 @@ constexpr std::size_t clipped_run = 3;
 constexpr double most_skipped = 0.25;
 
 std::string seconds(double s) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g s", s);
-  return text;
+  return formatted("%.3g s", s);
 }
 
 // Returns the magnitude of each sample in the loudest channel, with the channel means removed.

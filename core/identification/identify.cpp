@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 #include <optional>
 
+#include "core/format.h"
 #include "core/identification/fit.h"
 #include "core/identification/poles.h"
 #include "core/identification/spectrum.h"
@@ -37,12 +37,6 @@ constexpr double lowest_hz = 15.0;
 constexpr double least_quality = 0.5;
 // Number of standard deviations that a mode must stand above the noise.
 constexpr double sure = 3.0;
-
-std::string number(const char* form, double value) {
-  char text[48];
-  std::snprintf(text, sizeof text, form, value);
-  return text;
-}
 
 // The noise level of the residual around a mode, over the time that the mode rings.
 class Noise {
@@ -728,21 +722,21 @@ void warn_of_recording(const Blow& blow, Identification& found) {
         std::to_string(blow.clipped) + " samples are clipped: " +
         (blow.skipped > 0
              ? "the first " +
-                   number("%.3g", 1e3 * static_cast<double>(blow.skipped) / found.rate_hz) +
+                   formatted("%.3g", 1e3 * static_cast<double>(blow.skipped) / found.rate_hz) +
                    " ms are extrapolated from the sound that follows"
              : "some modes may be spurious and some amplitudes too small"));
   }
   if (!blow.is_first) {
     found.warnings.push_back("it has several blows; the loudest one is used, which begins at " +
-                             number("%.3g", found.onset_s) + " s");
+                             formatted("%.3g", found.onset_s) + " s");
   }
   if (blow.offset > 0.01) {
-    found.warnings.push_back("it has an offset (DC) of " + number("%.0f", 100.0 * blow.offset) +
+    found.warnings.push_back("it has an offset (DC) of " + formatted("%.0f", 100.0 * blow.offset) +
                              " % of its peak, which is removed");
   }
   if (blow.length_s > longest_ring_s + 0.001 && rings_s > longest_ring_s - 0.001) {
-    found.warnings.push_back("only the first " + number("%.0f", longest_ring_s) +
-                             " s after the blow, at " + number("%.3g", found.onset_s) +
+    found.warnings.push_back("only the first " + formatted("%.0f", longest_ring_s) +
+                             " s after the blow, at " + formatted("%.3g", found.onset_s) +
                              " s, are analysed");
   }
 }
@@ -885,7 +879,7 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
     made.warnings.push_back(
         (steady == 1 ? "a tone" : std::to_string(steady) + " tones") +
         std::string(" without a measurable decay ") + (steady == 1 ? "is" : "are") + " left out, " +
-        (steady == 1 ? "" : "the loudest ") + "at " + number("%.1f Hz", steady_hz));
+        (steady == 1 ? "" : "the loudest ") + "at " + formatted("%.1f Hz", steady_hz));
   }
   // The modes of noise are uncertain and explain little of it.
   const double rest_now = search->fit().rest_energy() / std::max(energy_in(made.sound), 1e-300);
@@ -925,7 +919,7 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
   if (made.residual_db > -6.0) {
     made.warnings.push_back(
         "the modes explain only " +
-        number("%.0f", 100.0 * (1.0 - std::pow(10.0, made.residual_db / 10.0))) +
+        formatted("%.0f", 100.0 * (1.0 - std::pow(10.0, made.residual_db / 10.0))) +
         " % of its energy; the recording does not sound like the ringing of one blow");
   }
   return made;

@@ -7,6 +7,7 @@
 
 #include "app/commands/body/recording.h"
 #include "app/text.h"
+#include "core/format.h"
 #include "core/identification/shapes.h"
 #include "core/model/language/expression.h"
 
@@ -17,9 +18,7 @@ constexpr double model_rate_hz = 44100.0;
 constexpr double noise_quality = 1.5;  // Q of the modes that carry noise.
 
 std::string five_digits(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.5g", value);
-  return text;
+  return formatted("%.5g", value);
 }
 
 double power_at(double hertz, const NoiseBand& band) {

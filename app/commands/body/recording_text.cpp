@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "app/text.h"
+#include "core/format.h"
 #include "core/identification/shapes.h"
 #include "core/model/language/expression.h"
 #include "core/ranges.h"
@@ -16,12 +17,6 @@ namespace ressort::commands {
 namespace {
 
 using nlohmann::json;
-
-std::string number(const char* form, double value) {
-  char text[64];
-  std::snprintf(text, sizeof text, form, value);
-  return text;
-}
 
 // Prints the known digits of a number and one more, at most twelve.
 std::string known_digits(double value, double deviation) {
@@ -62,16 +57,16 @@ std::string one_line(const std::string& text) {
 
 std::string header(const Identification& found, const std::string& source) {
   const std::size_t channels = found.sound.size();
-  std::string text = "# The modes of " + one_line(source) + ": " +
-                     counted(found.modes.size(), "mode", "modes") + ", found in " +
-                     number("%.4g", found.analysed_s) + " s from the blow at " +
-                     number("%.4g", found.onset_s) + " s.\n" + choices_of(found, "# ", "\n") +
-                     "# Residual without them: " + number("%.1f", found.residual_db) + " dB of all";
+  std::string text =
+      "# The modes of " + one_line(source) + ": " + counted(found.modes.size(), "mode", "modes") +
+      ", found in " + formatted("%.4g", found.analysed_s) + " s from the blow at " +
+      formatted("%.4g", found.onset_s) + " s.\n" + choices_of(found, "# ", "\n") +
+      "# Residual without them: " + formatted("%.1f", found.residual_db) + " dB of all";
   const double quiet = -100.0;  // octaves below this level contain nothing to explain
   for (const OctaveResidual& octave : found.octaves) {
     if (octave.level_db > quiet) {
-      text += "; " + number("%.0f", std::sqrt(octave.low_hz * octave.high_hz)) + " Hz " +
-              number("%.1f", octave.residual_db);
+      text += "; " + formatted("%.0f", std::sqrt(octave.low_hz * octave.high_hz)) + " Hz " +
+              formatted("%.1f", octave.residual_db);
     }
   }
   text += " dB by octave.\n";
@@ -91,7 +86,7 @@ std::string header(const Identification& found, const std::string& source) {
 std::string choices_of(const Identification& found, const std::string& before,
                        const std::string& after) {
   const std::string text = joined(found.choices, ", ", [](const Unexplained& choice) {
-    return std::to_string(choice.modes) + " modes " + number("%.1f", choice.residual_db) + " dB";
+    return std::to_string(choice.modes) + " modes " + formatted("%.1f", choice.residual_db) + " dB";
   });
   return text.empty() ? text
                       : before + "Residual of the best modes (--modes): " + text + "." + after;
@@ -134,10 +129,10 @@ std::string body_model(const Identification& found, const std::string& label,
     for (const double heard : shapes[k].heard) {
       text += " " + known_digits(heard, share * std::fabs(shapes[k].hit));
     }
-    text += "  # +-" + number("%.1g", mode.frequency_hz.deviation) + " Hz, +-" +
-            number("%.1g", 100.0 * mode.t60_s.deviation / mode.t60_s.value) + " %, " +
-            number("%.1f", decibels(size)) + " dB +-" + number("%.1g", decibels(1.0 + share)) +
-            "\n";
+    text += "  # +-" + formatted("%.1g", mode.frequency_hz.deviation) + " Hz, +-" +
+            formatted("%.1g", 100.0 * mode.t60_s.deviation / mode.t60_s.value) + " %, " +
+            formatted("%.1f", decibels(size)) + " dB +-" +
+            formatted("%.1g", decibels(1.0 + share)) + "\n";
   }
   text += "@in1 frcInput [@" + label + " hit]\n";
   for (std::size_t c = 0; c < places.size(); ++c) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "app/text.h"
+#include "core/format.h"
 
 namespace ressort::commands {
 namespace {
@@ -43,9 +44,7 @@ std::string significant(std::optional<double> value) {
   if (!value) {
     return "-";
   }
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", *value);
-  return text;
+  return formatted("%.6g", *value);
 }
 
 double seconds_at(const Description& description, std::size_t sample) {

@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "app/session/modes/known_modes.h"
 #include "app/session/timbre/timbre_figures.h"
 #include "app/text.h"
 #include "core/analysis/modes/scaling.h"
 #include "core/engine/playing.h"
+#include "core/format.h"
 #include "core/gesture.h"
 #include "core/laws/law.h"
 #include "core/model/language/expression.h"
@@ -42,10 +42,8 @@ std::string figure_text(TargetFigure figure, double value) {
                      : size >= 1.0   ? 2
                      : size >= 1e-3  ? 4
                                      : 7;
-  char small[32];
-  std::snprintf(small, sizeof small, "%.4g", value);
   return (size >= 1e9                 ? print_number(value)
-          : size > 0.0 && size < 1e-5 ? std::string(small)
+          : size > 0.0 && size < 1e-5 ? formatted("%.4g", value)
                                       : with_commas(value, digits)) +
          unit;
 }

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 #include <utility>
 
 #include "core/analysis/modes/scaling.h"
+#include "core/format.h"
 #include "core/linear_algebra/eigen.h"
 #include "core/model/topology.h"
 
@@ -21,9 +21,7 @@ constexpr int most_steps = 300;
 constexpr int most_stalls = 12;
 
 std::string hertz(double frequency_hz) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.2f Hz", frequency_hz);
-  return text;
+  return formatted("%.2f Hz", frequency_hz);
 }
 
 // Computes the modes of one network while the factors of its lines change.

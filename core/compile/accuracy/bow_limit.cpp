@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <map>
 
 #include "core/analysis/assembly.h"
 #include "core/analysis/places.h"
+#include "core/format.h"
 #include "core/kernels/oversampled/oversampled_form.h"
 #include "core/laws/law.h"
 #include "core/model/language/expression.h"
@@ -91,11 +91,7 @@ std::optional<Error> check_bow(const Bow& bow, double steps, double rate_hz) {
   if (!(needed > steps)) {
     return std::nullopt;
   }
-  const auto rounded = [](double value) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.3g", value);
-    return std::string(text);
-  };
+  const auto rounded = [](double value) { return formatted("%.3g", value); };
   const double higher_hz = std::ceil(needed / steps * rate_hz / 1000.0) * 1000.0;
   std::string remedy = "lower Z";
   if (higher_hz <= highest_rate_hz) {
