@@ -29,7 +29,7 @@ bool is_any(const double* samples, std::size_t frames, bool zero) {
   return any_of(found) || std::any_of(samples + n, samples + frames, is_wanted);
 }
 
-// What the changes alone make of c[n - 3] .. c[n].
+// Returns the part of y[n] that the four newest changes make; c[3] is the newest one.
 double sum_of_changes(const double* c, const DcPoles& poles) {
   const auto& p = poles.power;
   return (c[3] + p[1] * c[2]) + (p[2] * c[1] + p[3] * c[0]);
