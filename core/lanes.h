@@ -147,6 +147,24 @@ static inline bool any_of(Mask mask) {
   }
 }
 
+// Returns whether one of the numbers is 0, or, if `zero` is false, whether one is not.
+template <std::size_t Bytes>
+static inline bool is_any(const double* numbers, std::size_t count, bool zero) {
+  using V = Pack<double, Bytes>;
+  constexpr std::size_t lanes = Bytes / sizeof(double);
+  auto found = V{} != V{};
+  std::size_t n = 0;
+  for (; n + lanes <= count; n += lanes) {
+    const auto is_zero = load<V>(numbers + n) == V{};
+    found |= zero ? is_zero : ~is_zero;
+  }
+  bool is_found = any_of(found);
+  for (; n < count; ++n) {
+    is_found |= (numbers[n] == 0.0) == zero;
+  }
+  return is_found;
+}
+
 inline constexpr std::size_t widest_bytes = 64;  // size of the widest pack
 
 // Allocates on cache lines, so that every pack is aligned.

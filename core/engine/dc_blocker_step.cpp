@@ -13,21 +13,9 @@
 namespace ressort::engine::RESSORT_ISA {
 namespace {
 
+constexpr std::size_t widest = vector_bytes(Isa::RESSORT_ISA);
 constexpr std::size_t back = 4;
 using Four = Pack<double, back * sizeof(double)>;
-
-bool is_any(const double* samples, std::size_t frames, bool zero) {
-  using V = Pack<double, vector_bytes(Isa::RESSORT_ISA)>;
-  constexpr std::size_t lanes = sizeof(V) / sizeof(double);
-  auto found = V{} != V{};
-  std::size_t n = 0;
-  for (; n + lanes <= frames; n += lanes) {
-    const auto is_zero = load<V>(samples + n) == V{};
-    found |= zero ? is_zero : ~is_zero;
-  }
-  const auto is_wanted = [=](double x) { return (x == 0.0) == zero; };
-  return any_of(found) || std::any_of(samples + n, samples + frames, is_wanted);
-}
 
 // Returns the part of y[n] that the four newest changes make; c[3] is the newest one.
 double sum_of_changes(const double* c, const DcPoles& poles) {
@@ -81,7 +69,7 @@ void filter_sound(double* const* channels, std::size_t frames, const DcPoles& po
 void filter_with_silence(double* channel, std::size_t frames, const DcPoles& poles,
                          DcState& state) {
   constexpr double nothing = 1e-7;  // -140 dBFS
-  if (state.in == 0.0 && state.out[back - 1] == 0.0 && !is_any(channel, frames, false)) {
+  if (state.in == 0.0 && state.out[back - 1] == 0.0 && !is_any<widest>(channel, frames, false)) {
     return;
   }
   for (std::size_t n = 0; n < frames; ++n) {
@@ -110,7 +98,7 @@ void filter_block(double* const* channels, std::size_t count, std::size_t frames
   DcState* sounding_states[2];
   std::size_t found = 0;
   for (std::size_t c = 0; c < count; ++c) {
-    if (is_any(channels[c], frames, true)) {
+    if (is_any<widest>(channels[c], frames, true)) {
       filter_with_silence(channels[c], frames, poles, states[c]);
     } else {
       sounding[found] = channels[c];

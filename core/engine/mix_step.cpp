@@ -35,17 +35,7 @@ template <class V>
 // --- inputs -------------------------------------------------------------------------------------
 
 bool is_silent(const double* samples, std::size_t frames) {
-  using V = Pack<double, widest>;
-  constexpr std::size_t lanes = widest / sizeof(double);
-  Bits<V> any{};
-  std::size_t n = 0;
-  for (; n + lanes <= frames; n += lanes) {
-    any |= magnitude(load<V>(samples + n));
-  }
-  if (n < frames) {
-    any |= magnitude(load_some<V>(samples + n, frames - n));
-  }
-  return folded(any, [](auto a, auto b) { return a | b; }) == 0;
+  return !is_any<widest>(samples, frames, false);
 }
 
 template <std::size_t Step, class T>

@@ -194,8 +194,11 @@ PlacedModes placed_modes(const NetworkModes& modes) {
 }
 
 std::string body_text(const PlacedModes& modes) {
-  std::string text = "@" + modes.name + " body " + print_number(modes.mass) + " " +
-                     joined(modes.places, " ") + "\n";
+  std::string text = "@" + modes.name + " body " + print_number(modes.mass);
+  for (const std::string& place : modes.places) {
+    text += " " + place;
+  }
+  text += "\n";
   for (std::size_t i = 0; i < modes.modes.size(); ++i) {
     const PlacedMode& mode = modes.modes[i];
     text += "@" + modes.name + std::to_string(i + 1) + " mode @" + modes.name + " " +
