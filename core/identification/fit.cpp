@@ -132,6 +132,12 @@ std::vector<Complex> poles_of(std::span<const DampedMode> modes) {
 DampedFit::DampedFit(std::span<const std::vector<double>> sound)
     : sound_(sound), constant_(sound.size()), rest_(sound.begin(), sound.end()) {}
 
+Complex DampedFit::allowed(Complex log_z) const {
+  const double omega = std::max(log_z.imag(), lowest_omega_);
+  return lowest_omega_ > 0.0 ? Complex(std::clamp(log_z.real(), -omega, -least_alpha_), omega)
+                             : log_z;
+}
+
 void DampedFit::find_rest() {
   ++version_;
   for (std::size_t c = 0; c < sound_.size(); ++c) {
@@ -159,7 +165,7 @@ bool DampedFit::set_poles(const std::vector<Complex>& log_z) {
   constant_.assign(channels, 0.0);
   set_modes({});
   for (const Complex pole : log_z) {
-    modes_.push_back({pole, std::vector<Complex>(channels)});
+    modes_.push_back({allowed(pole), std::vector<Complex>(channels)});
   }
   const Normal normal(modes_, channels, sound_[0].size(), false);
   for (std::size_t c = 0; c < channels; ++c) {
@@ -325,8 +331,16 @@ void DampedFit::refine(int steps, double settled, const Progress& progress) {
       for (std::size_t i = 0; i < 2 * count; ++i) {
         damped(i, i) += (damping + ridge) * normal.poles(i, i) + 1e-300;
       }
-      const auto step = positive_solution(damped, wanted);
+      auto step = positive_solution(damped, wanted);
       if (step) {
+        // The amplitudes below are the best ones for the limited step.
+        for (std::size_t k = 0; k < count; ++k) {
+          const Complex from = before[k].log_z;
+          const Complex moved =
+              allowed(from + Complex((*step)(2 * k, 0), (*step)(2 * k + 1, 0))) - from;
+          (*step)(2 * k, 0) = moved.real();
+          (*step)(2 * k + 1, 0) = moved.imag();
+        }
         for (std::size_t c = 0; c < channels; ++c) {
           Matrix left = linear[c];
           left.values -= product(normal.mixed[c], *step).values;

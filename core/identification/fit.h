@@ -40,6 +40,12 @@ class DampedFit {
   // Takes channels of equal length. A constant offset is fitted as well.
   explicit DampedFit(std::span<const std::vector<double>> sound);
 
+  // Limits the modes that are fitted from now on: to frequencies of `lowest_omega`, above 0, and
+  // more, to decays of `least_alpha` and more, and to a Q of 1/2 and more.
+  void limit(double lowest_omega, double least_alpha) {
+    lowest_omega_ = lowest_omega;
+    least_alpha_ = least_alpha;
+  }
   // Sets the poles and solves for the best amplitudes. Returns false if the poles cannot be
   // distinguished.
   bool set_poles(const std::vector<Complex>& log_z);
@@ -67,12 +73,15 @@ class DampedFit {
   std::vector<DampedDeviation> deviations(bool with_poles) const;
 
  private:
+  Complex allowed(Complex log_z) const;  // Returns the nearest pole that a mode can have.
   void find_rest();
 
   std::span<const std::vector<double>> sound_;
   std::vector<DampedMode> modes_;
   std::vector<double> constant_;
   std::vector<std::vector<double>> rest_;
+  double lowest_omega_ = 0.0;  // 0 without limits.
+  double least_alpha_ = 0.0;
   std::size_t version_ = 0;
 };
 

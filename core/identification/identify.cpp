@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <optional>
 
@@ -24,7 +25,7 @@ constexpr std::size_t least_fitted = 150;  // Number of modes that are fitted at
 // Modes that leave less than this share of the energy are not those of noise.
 constexpr double most_of_noise = 0.8;
 // Largest share of the energy that may be lost by leaving out the contact.
-constexpr double most_left_out = 0.05;
+constexpr double most_left_out = 0.01;
 // Number of modes whose residual is reported, from the largest.
 constexpr std::size_t choices[] = {40, 20, 10, 5};
 // A residual below this share of the sound's energy is rounding error.
@@ -132,6 +133,10 @@ bool are_twins(Complex a, Complex b, double share, std::size_t frames) {
   return std::abs(a - b) < near;
 }
 
+double highest_omega(double rate_hz) {
+  return 2.0 * std::numbers::pi * std::min(0.45, highest_mode_hz / rate_hz);
+}
+
 // Fits all numbers of a growing set of modes.
 class Search {
  public:
@@ -189,23 +194,16 @@ class Search {
   // explain the most of the residual. Repeats while the residual falls by a twentieth.
   void add_damped_modes(double highest_omega) {
     constexpr int rounds = 6;
-    constexpr double grid_step = 1.03;
     progress_.stage("searching for damped modes");
-    std::vector<Complex> grid;
     // From 30 Hz at 44,100 Hz, and four periods in the sound.
-    const double lowest_omega =
-        std::max(0.004, 8.0 * std::numbers::pi / static_cast<double>(frames()));
-    for (double omega = lowest_omega; omega < highest_omega; omega *= grid_step) {
-      for (double quality = 2.5; quality < 50.0; quality *= 2.0) {
-        grid.emplace_back(-0.5 * omega / quality, omega);
-      }
-    }
+    const std::vector<Complex> grid = damped_grid(
+        std::max(0.004, 8.0 * std::numbers::pi / static_cast<double>(frames())), highest_omega);
     for (int round = 0; round < rounds && fit_.modes().size() < most_; ++round) {
       const double before = fit_.rest_energy();
       if (before < rounding * sound_energy_) {
         return;
       }
-      add(explaining(grid));
+      add(explaining(grid, 0.0));
       drop_unlikely();
       fit_.refine(4, roughly_settled, progress_);
       drop_unlikely();
@@ -221,6 +219,74 @@ class Search {
     fit_.set_poles(poles);
     for (int round = 0; round < 20 && drop_unlikely() + drop_uncertain() > 0; ++round) {
     }
+  }
+
+  // Removes modes until `count` are left, a quarter at a time so that the others can move.
+  void shrink(std::size_t count) {
+    std::size_t had = 0;
+    do {
+      had = fit_.modes().size();
+      keep_best(std::max(count, had * 3 / 4), {});
+      fit_.refine(4, roughly_settled, progress_);
+    } while (fit_.modes().size() > count && fit_.modes().size() < had);
+  }
+
+  // Exchanges modes for strongly damped ones while the residual falls. At most `count` are left.
+  void exchange(std::size_t count, const std::vector<Complex>& grid) {
+    constexpr int rounds = 12;
+    int poor = 0;
+    for (int round = 0; round < rounds && poor < 2; ++round) {
+      const DampedFit before = fit_;
+      const double rest = before.rest_energy();
+      if (rest < rounding * sound_energy_) {
+        return;
+      }
+      add(explaining(grid, std::numbers::pi / static_cast<double>(frames())));
+      if (fit_.rest_energy() > 0.97 * rest) {  // As much as modes of noise explain.
+        fit_ = before;
+        return;
+      }
+      // In every other round the new modes move before the choice.
+      fit_.refine(round % 2 * 4, roughly_settled, progress_);
+      shrink(count);
+      poor += fit_.rest_energy() > 0.99 * rest ? 1 : 0;
+      if (fit_.rest_energy() > rest) {
+        fit_ = before;
+      }
+    }
+  }
+
+  // Fits the `count` modes that explain the most. Starts twice, with all modes found and with none,
+  // and keeps the better set. Each mode decays at least as fast as `least_alpha` and has a period
+  // in the sound.
+  void choose(std::size_t count, double rate_hz, double least_alpha) {
+    progress_.stage("choosing the modes");
+    const double lowest_omega =
+        2.0 * std::numbers::pi * std::max(lowest_hz / rate_hz, 1.0 / static_cast<double>(frames()));
+    fit_.limit(lowest_omega, least_alpha);
+    const std::vector<Complex> grid = damped_grid(1.4 * lowest_omega, highest_omega(rate_hz));
+    std::vector<Complex> pool = poles_of(fit_.modes());
+    std::ranges::copy(grid, std::back_inserter(pool));
+    shrink(count);
+    exchange(count, grid);
+    const DampedFit first = fit_;
+    if (first.rest_energy() < rounding * sound_energy_) {
+      return;
+    }
+    fit_.set_poles({});
+    for (std::size_t had = count; fit_.modes().size() < count && fit_.modes().size() != had;) {
+      had = fit_.modes().size();
+      std::vector<Complex> best =
+          explaining(pool, std::numbers::pi / static_cast<double>(frames()));
+      best.resize(std::min(best.size(), 1 + (count - had) / 5));
+      add(best);
+      fit_.refine(2, roughly_settled, progress_);
+    }
+    exchange(count, grid);
+    if (first.rest_energy() < fit_.rest_energy()) {
+      fit_ = first;
+    }
+    fit_.refine(10, settled, progress_);
   }
 
   void finish() {
@@ -239,9 +305,6 @@ class Search {
       return k;
     });
   }
-
-  // Fits the modes that were kept to the sound.
-  void refit() { fit_.refine(10, settled, progress_); }
 
   // Keeps the `count` modes that explain the most together, not counting those for which `is_kept`
   // holds. The poles stay. Returns the number of removed modes.
@@ -285,6 +348,18 @@ class Search {
   std::size_t frames() const { return sound_[0].size(); }
 
  private:
+  // Returns log z of strongly damped modes.
+  static std::vector<Complex> damped_grid(double lowest_omega, double highest_omega) {
+    constexpr double step = 1.03;
+    std::vector<Complex> grid;
+    for (double omega = lowest_omega; omega < highest_omega; omega *= step) {
+      for (double quality = 2.5; quality < 50.0; quality *= 2.0) {
+        grid.emplace_back(-0.5 * omega / quality, omega);
+      }
+    }
+    return grid;
+  }
+
   void forget_old() {
     if (known_version_ != fit_.version()) {
       noise_.reset();
@@ -330,14 +405,16 @@ class Search {
     return strongest;
   }
 
-  // Returns the poles that explain much of the residual, none near one that explains more.
-  std::vector<Complex> explaining(const std::vector<Complex>& poles) const {
+  // Returns the poles that explain much of the residual, none within twice its damping plus
+  // `distance` of one that explains more.
+  std::vector<Complex> explaining(const std::vector<Complex>& poles, double distance) const {
     constexpr double much = 0.1;  // Least share of the energy that the best one explains.
     std::vector<Complex> best;
     const std::vector<Ranked> ranked = rank(poles, fit_.rest());
     for (const auto& [explained, log_z] : ranked) {
-      const auto is_near = [z = log_z](Complex other) {
-        return std::fabs(other.imag() - z.imag()) < 2.0 * std::max(-other.real(), -z.real());
+      const auto is_near = [z = log_z, distance](Complex other) {
+        return std::fabs(other.imag() - z.imag()) <
+               2.0 * std::max(-other.real(), -z.real()) + distance;
       };
       if (explained > much * ranked[0].explained && std::ranges::none_of(best, is_near)) {
         best.push_back(log_z);
@@ -461,7 +538,7 @@ class Search {
 };
 
 void search_all(Search& search, double rate_hz) {
-  const double highest = 2.0 * std::numbers::pi * std::min(0.45, highest_mode_hz / rate_hz);
+  const double highest = highest_omega(rate_hz);
   const auto decimation = std::size_t{1} << static_cast<unsigned>(
                               std::max(1.0, std::round(std::log2(rate_hz / band_hz))));
   struct Stage {
@@ -602,8 +679,8 @@ Fate fate_of(const Found& found, double rate_hz, std::size_t frames, bool must_b
     return Fate::steady;
   }
   const bool is_known = !must_be_known || found.deviation.alpha < alpha;
-  const bool rings = is_known && omega > 2.0 * std::numbers::pi * lowest_hz / rate_hz &&
-                     omega < 0.999 * std::numbers::pi && omega > 2.0 * least_quality * alpha &&
+  const bool rings = is_known && omega > 1.99 * std::numbers::pi * lowest_hz / rate_hz &&
+                     omega < 0.999 * std::numbers::pi && omega > 1.99 * least_quality * alpha &&
                      omega <= 2.0 * std::numbers::pi * highest_mode_hz / rate_hz;
   return rings ? Fate::kept : Fate::unfit;
 }
@@ -658,9 +735,7 @@ std::vector<Unexplained> try_choices(Search search, double energy) {
   std::vector<Unexplained> tried;
   for (const std::size_t count : choices) {
     if (search.fit().modes().size() >= count) {
-      search.keep_likely(count, true);
-      search.keep_best(count, {});
-      search.refit();
+      search.shrink(count);
       tried.insert(tried.begin(), {count, decibels(search.fit().rest_energy() / energy)});
     }
   }
@@ -788,9 +863,6 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
       blow->skipped += head;
       search.emplace(made.sound, least, most, progress);
       search->start(poles_of(free.fit().modes()));
-      if (free.fit().modes().size() < options.least_modes) {
-        search_all(*search, rate_hz);
-      }
     }
   }
   const std::size_t frames = made.sound[0].size();
@@ -815,37 +887,30 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
   search->remove(are(fates(false), Fate::unfit));
   made.choices = try_choices(*search, std::max(energy_in(made.sound), 1e-300));
   bool must_be_known = options.least_modes == 0;
-  const auto reduce = [&](bool keeps_groups) {
-    search->keep_likely(options.least_modes, keeps_groups);
-    if (search->keep_best(options.most_modes, are(fates(false), Fate::steady)) > 0 &&
-        options.least_modes > 0) {
-      // A new fit lets the modes that are kept stand for those that were removed, too.
-      const std::vector<DampedMode> best = search->fit().modes();
-      search->refit();
-      const std::vector<Fate> all = fates(false);
-      if (std::ranges::find(all, Fate::unfit) != all.end()) {
-        search->fit().set_modes(best);
-      }
-    }
-    const std::vector<DampedMode> likely = search->fit().modes();
-    const double most_rest = much_more * search->fit().rest_energy();
-    search->remove(are(fates(must_be_known), Fate::unfit));
-    if (must_be_known && search->fit().rest_energy() > most_rest) {
-      must_be_known = false;
-      search->fit().set_modes(likely);
-      search->remove(are(fates(must_be_known), Fate::unfit));
-    }
-  };
-  const Search whole = *search;
-  reduce(true);
   if (options.least_modes > 0) {
-    // A number of modes that noise could explain, too, is a choice: the better one is made.
-    const Search grouped = *search;
-    search.emplace(whole);
-    reduce(false);
-    if (grouped.rest_energy() < search->fit().rest_energy()) {
-      search.emplace(grouped);
+    // A sound of less than a second does not show whether a tone is steady.
+    const double least_alpha = made.analysed_s < 1.0 ? 1.01 / static_cast<double>(frames) : 0.0;
+    const Search whole = *search;
+    const auto steady_count = [&] {
+      return static_cast<std::size_t>(std::ranges::count(fates(false), Fate::steady));
+    };
+    std::size_t steady = 0;
+    for (std::size_t now = steady_count(); now >= steady && steady < 8; now = steady_count()) {
+      search.emplace(whole);
+      search->choose(options.least_modes + now, rate_hz, least_alpha);
+      steady = now + 1;
     }
+  } else {
+    search->keep_likely(0, true);
+  }
+  search->keep_best(options.most_modes, are(fates(false), Fate::steady));
+  const std::vector<DampedMode> likely = search->fit().modes();
+  const double most_rest = much_more * search->rest_energy();
+  search->remove(are(fates(must_be_known), Fate::unfit));
+  if (must_be_known && search->rest_energy() > most_rest) {
+    must_be_known = false;
+    search->fit().set_modes(likely);
+    search->remove(are(fates(must_be_known), Fate::unfit));
   }
   std::vector<Found> kept;
   double steady_hz = 0.0;
