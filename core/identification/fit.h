@@ -73,14 +73,14 @@ class DampedFit {
   std::vector<DampedDeviation> deviations(bool with_poles) const;
 
  private:
-  Complex allowed(Complex log_z) const;  // Returns the nearest pole that a mode can have.
+  Complex allowed(Complex log_z) const;  // Returns the nearest pole within the limits.
   void find_rest();
 
   std::span<const std::vector<double>> sound_;
   std::vector<DampedMode> modes_;
   std::vector<double> constant_;
   std::vector<std::vector<double>> rest_;
-  double lowest_omega_ = 0.0;  // 0 without limits.
+  double lowest_omega_ = 0.0;  // 0: no limits
   double least_alpha_ = 0.0;
   std::size_t version_ = 0;
 };

@@ -242,7 +242,7 @@ class Search {
         return;
       }
       add(explaining(grid, std::numbers::pi / static_cast<double>(frames())));
-      if (fit_.rest_energy() > 0.97 * rest) {  // As much as modes of noise explain.
+      if (fit_.rest_energy() > 0.97 * rest) {  // as much as modes of noise explain
         fit_ = before;
         return;
       }
@@ -679,6 +679,7 @@ Fate fate_of(const Found& found, double rate_hz, std::size_t frames, bool must_b
     return Fate::steady;
   }
   const bool is_known = !must_be_known || found.deviation.alpha < alpha;
+  // The search may have put a pole on these limits, with rounding.
   const bool rings = is_known && omega > 1.99 * std::numbers::pi * lowest_hz / rate_hz &&
                      omega < 0.999 * std::numbers::pi && omega > 1.99 * least_quality * alpha &&
                      omega <= 2.0 * std::numbers::pi * highest_mode_hz / rate_hz;
