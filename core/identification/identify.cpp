@@ -246,7 +246,7 @@ class Search {
         fit_ = before;
         return;
       }
-      // In every other round the new modes move before the choice.
+      // The new modes move before the choice in every other round.
       fit_.refine(round % 2 * 4, roughly_settled, progress_);
       shrink(count);
       poor += fit_.rest_energy() > 0.99 * rest ? 1 : 0;
@@ -292,7 +292,7 @@ class Search {
   void finish() {
     progress_.stage("fitting the modes to the sound");
     fit_.refine(10, settled, progress_);
-    keep_likely(least_, true);
+    keep_likely(least_);
   }
 
   // Removes the modes for which `is_wrong` holds.
@@ -307,11 +307,11 @@ class Search {
   }
 
   // Keeps the `count` modes that explain the most together, not counting those for which `is_kept`
-  // holds. The poles stay. Returns the number of removed modes.
-  std::size_t keep_best(std::size_t count, std::vector<bool> is_kept) {
+  // holds. The poles stay.
+  void keep_best(std::size_t count, std::vector<bool> is_kept) {
     is_kept.resize(fit_.modes().size());
     auto left = static_cast<std::size_t>(std::ranges::count(is_kept, false));
-    return fit_.eliminate([&](const std::vector<double>& drops) {
+    fit_.eliminate([&](const std::vector<double>& drops) {
       std::size_t least = drops.size();
       for (std::size_t k = 0; k < drops.size() && left > count; ++k) {
         if (!is_kept[k] && (least == drops.size() || drops[k] < drops[least])) {
@@ -323,10 +323,10 @@ class Search {
     });
   }
 
-  // Keeps only modes that stand above the noise, but at least this many. With `keeps_groups`,
-  // uncertain modes are kept if the sound cannot be explained without them: each mode of a group
-  // can be uncertain while the group is not.
-  void keep_likely(std::size_t least, bool keeps_groups) {
+  // Keeps only modes that stand above the noise, but at least this many. Uncertain modes are kept
+  // if the sound cannot be explained without them: each mode of a group can be uncertain while the
+  // group is not.
+  void keep_likely(std::size_t least) {
     least_ = least;
     bool drops_uncertain = true;
     for (int round = 0; round < 20; ++round) {
@@ -338,7 +338,7 @@ class Search {
         return;
       }
       fit_.refine(10, settled, progress_);
-      if (keeps_groups && uncertain > 0 && fit_.rest_energy() > most_rest) {
+      if (uncertain > 0 && fit_.rest_energy() > most_rest) {
         drops_uncertain = false;
         fit_.set_modes(before);
       }
@@ -895,6 +895,7 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
     const auto steady_count = [&] {
       return static_cast<std::size_t>(std::ranges::count(fates(false), Fate::steady));
     };
+    // Steady tones are not modes of the body, and each choice may find more of them.
     std::size_t steady = 0;
     for (std::size_t now = steady_count(); now >= steady && steady < 8; now = steady_count()) {
       search.emplace(whole);
@@ -902,7 +903,7 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
       steady = now + 1;
     }
   } else {
-    search->keep_likely(0, true);
+    search->keep_likely(0);
   }
   search->keep_best(options.most_modes, are(fates(false), Fate::steady));
   const std::vector<DampedMode> likely = search->fit().modes();
