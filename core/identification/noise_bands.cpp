@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <complex>
 
-#include "core/linear_algebra/fourier.h"
+#include "core/identification/bands.h"
 #include "core/noise.h"
 
 namespace ressort::identification {
@@ -13,7 +12,7 @@ namespace {
 
 constexpr double edges_hz[] = {20.0,   100.0,  200.0,  300.0,  450.0,   700.0,   1000.0, 1500.0,
                                2200.0, 3200.0, 4700.0, 7000.0, 10000.0, 14000.0, 20000.0};
-constexpr double step_s = 0.003;
+constexpr double longest_frame_s = 0.003;
 constexpr double least_share = 1e-6;
 
 // Returns the energy of each frame of the band.
@@ -29,54 +28,32 @@ std::vector<double> frame_energies(const std::vector<double>& samples, std::size
   return energies;
 }
 
-// The spectrum of a channel.
-struct Spectrum {
-  explicit Spectrum(const std::vector<double>& samples)
-      : fourier(std::bit_ceil(samples.size() * 3 / 2)),
-        bins(fourier.bins()),
-        frames(samples.size()) {
-    std::vector<double> padded = samples;
-    padded.resize(fourier.size());
-    fourier.forward(padded, bins);
-  }
-  // Returns the samples between two frequencies.
-  std::vector<double> part_between(double low_hz, double high_hz, double rate_hz) {
-    std::vector<std::complex<double>> part(bins.size());
-    for (std::size_t k = 0; k < bins.size(); ++k) {
-      const double hertz = static_cast<double>(k) * rate_hz / static_cast<double>(fourier.size());
-      part[k] = hertz >= low_hz && hertz < high_hz ? bins[k] : 0.0;
-    }
-    std::vector<double> padded(fourier.size());
-    fourier.inverse(part, padded);
-    padded.resize(frames);
-    return padded;
-  }
-
-  Fourier fourier;
-  std::vector<std::complex<double>> bins;
-  std::size_t frames;
-};
-
 }  // namespace
 
 std::vector<NoiseBand> noise_bands(const Identification& found) {
-  const auto frame = std::max<std::size_t>(1, static_cast<std::size_t>(step_s * found.rate_hz));
+  const std::size_t frame = std::bit_floor(
+      std::max<std::size_t>(1, static_cast<std::size_t>(longest_frame_s * found.rate_hz)));
   double sound = 0.0;
   for (const std::vector<double>& channel : found.sound) {
     for (const double x : channel) {
       sound += x * x;
     }
   }
-  std::vector<Spectrum> spectra(found.residual.begin(), found.residual.end());
+  const std::vector<BandSplit> splits(found.residual.begin(), found.residual.end());
   std::vector<NoiseBand> bands;
   for (std::size_t b = 0; b + 1 < std::size(edges_hz) && edges_hz[b] < 0.45 * found.rate_hz; ++b) {
     NoiseBand band{.low_hz = edges_hz[b],
                    .high_hz = std::min(edges_hz[b + 1], 0.5 * found.rate_hz)};
+    // A low band needs few samples, but some in each frame.
+    const std::size_t step =
+        std::min(std::max<std::size_t>(1, frame / 4),
+                 std::bit_floor(static_cast<std::size_t>(0.5 * found.rate_hz / band.high_hz)));
     std::vector<double> all;
     std::vector<double> of_channel;
-    for (Spectrum& spectrum : spectra) {
-      std::vector<double> energies =
-          frame_energies(spectrum.part_between(band.low_hz, band.high_hz, found.rate_hz), frame);
+    for (const BandSplit& split : splits) {
+      std::vector<double> energies = frame_energies(
+          split.between(band.low_hz / found.rate_hz, band.high_hz / found.rate_hz, step),
+          frame / step);
       // The steady noise of the room is that of the end.
       std::vector<double> tail(
           energies.begin() + static_cast<std::ptrdiff_t>(energies.size() * 3 / 4), energies.end());
@@ -85,7 +62,7 @@ std::vector<NoiseBand> noise_bands(const Identification& found) {
       double sum = 0.0;
       all.resize(energies.size());
       for (std::size_t i = 0; i < energies.size(); ++i) {
-        const double above = std::max(0.0, energies[i] - *middle);
+        const double above = static_cast<double>(step) * std::max(0.0, energies[i] - *middle);
         all[i] += above;
         sum += above;
       }
