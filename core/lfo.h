@@ -10,7 +10,7 @@
 
 namespace ressort {
 
-enum class LfoShape : std::uint8_t { sine, triangle, random, steps };
+enum class LfoShape : std::uint8_t { sine, triangle, random, steps, fall };
 
 // Tempo without a clock: 120 beats per minute.
 inline constexpr double usual_beats_per_s = 2.0;
@@ -46,10 +46,12 @@ class LfoState {
   }
   void advance(double seconds) { age_s_ += seconds; }
   // Returns a value in -depth..depth. The random shape joins random points by straight lines, one
-  // point per period. The steps keep a random value for a period, from the start.
+  // point per period. The steps keep a random value for a period, from the start. The fall starts
+  // at the depth and decreases by the factor e in each period.
   double value(const Lfo& lfo) {
     const double t = age_s_ - lfo.delay_s;
-    if (t < 0.0 || (t == 0.0 && lfo.shape != LfoShape::steps)) {
+    const bool starts_at_zero = lfo.shape != LfoShape::steps && lfo.shape != LfoShape::fall;
+    if (t < 0.0 || (t == 0.0 && starts_at_zero)) {
       return 0.0;
     }
     const double turns = turns_at(t);
@@ -68,6 +70,8 @@ class LfoState {
           to_ = random_.next();
         }
         return depth * (lfo.shape == LfoShape::steps ? to_ : from_ + (to_ - from_) * part);
+      case LfoShape::fall:
+        return depth * std::exp(-turns);
     }
     return 0.0;
   }

@@ -83,11 +83,12 @@ std::vector<Control> make_controls(const Network& network, const Preset& preset)
 std::vector<PlayedLfo> make_lfos(const Preset& preset) {
   std::vector<PlayedLfo> lfos;
   for (const LfoSetting& setting : preset.lfos) {
-    lfos.push_back(
-        {.lfo = setting.lfo,
-         .is_scaled = setting.by.has_value(),
-         .by = setting.by == ControlSource::controller ? Source::controller : Source::pressure,
-         .number = static_cast<std::uint16_t>(setting.number)});
+    lfos.push_back({.lfo = setting.lfo,
+                    .is_scaled = setting.by.has_value(),
+                    .by = setting.by == ControlSource::controller ? Source::controller
+                          : setting.by == ControlSource::note     ? Source::note
+                                                                  : Source::pressure,
+                    .number = static_cast<std::uint16_t>(setting.number)});
   }
   return lfos;
 }

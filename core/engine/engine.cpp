@@ -175,6 +175,7 @@ struct Engine::Player {
     }
     lfos.restart(voices.latest(), notes, keyboard);
     strike_note(event.index, velocity);
+    lfos.follow_level(voices.latest(), keyboard);
   }
 
   // Plays the note controls of the latest voice.

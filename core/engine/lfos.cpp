@@ -40,6 +40,12 @@ void Lfos::restart(std::size_t lane, std::uint64_t note, Keyboard& keyboard) {
   apply(lane, keyboard);
 }
 
+void Lfos::follow_level(std::size_t lane, Keyboard& keyboard) {
+  if (count_ > 0) {
+    apply(lane, keyboard);
+  }
+}
+
 void Lfos::set_tempo(double beats_per_s) {
   if (!(beats_per_s > 0.0) || beats_per_s == beats_per_s_) {
     return;
@@ -92,7 +98,11 @@ void Lfos::apply(std::size_t lane, Keyboard& keyboard) {
   for (const Control& control : playing_.controls) {
     if (control.source == Source::lfo) {
       const std::size_t i = lane * count_ + control.number;
-      const double value = scales_[i] * states_[i].value(playing_.lfos[control.number].lfo);
+      const PlayedLfo& lfo = playing_.lfos[control.number];
+      const double strength = keyboard.voices[lane].strength;
+      const double scale =
+          lfo.is_scaled && lfo.by == Source::note ? strength * strength : scales_[i];
+      const double value = scale * states_[i].value(lfo.lfo);
       const GestureSettings& range = control.settings;
       const double wanted = range.low + (range.high - range.low) * (0.5 + 0.5 * value);
       constexpr double cents = 0.01;

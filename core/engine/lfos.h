@@ -21,6 +21,8 @@ class Lfos {
   // Restarts the LFOs of a voice at a key press. `note` is the number of the note, the seed of its
   // random differences.
   void restart(std::size_t lane, std::uint64_t note, Keyboard& keyboard);
+  // Follows the level at which the latest note is struck.
+  void follow_level(std::size_t lane, Keyboard& keyboard);
   // Follows a controller or the pressure that scales a depth.
   void scale(Source source, int number, double amount, const Scope& scope,
              const Keyboard& keyboard);

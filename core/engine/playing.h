@@ -46,9 +46,9 @@ struct Control {
 
 struct PlayedLfo {
   Lfo lfo;
-  bool is_scaled = false;  // a controller or the pressure scales its depth
-  Source by = Source::pressure;
-  std::uint16_t number = 0;  // controller
+  bool is_scaled = false;        // a controller, the pressure or the note's level scales its depth
+  Source by = Source::pressure;  // Source::note: the energy that belongs to the note's level
+  std::uint16_t number = 0;      // controller
 };
 
 // Greatest random differences from note to note.

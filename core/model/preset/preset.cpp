@@ -229,19 +229,23 @@ void read_lfo(const toml::table& table, Preset& preset, std::vector<Error>& erro
     lfo.shape = shape == "triangle" ? LfoShape::triangle
                 : shape == "random" ? LfoShape::random
                 : shape == "steps"  ? LfoShape::steps
+                : shape == "fall"   ? LfoShape::fall
                                     : LfoShape::sine;
     if (lfo.shape == LfoShape::sine && shape != "sine") {
-      reader.fail(*table.get("shape"), "'shape' must be sine, triangle, random or steps");
+      reader.fail(*table.get("shape"), "'shape' must be sine, triangle, random, steps or fall");
     }
   }
   if (std::string by; reader.text("by", by)) {
     ControlSetting scaled;
-    if (read_source(by, scaled) &&
-        (scaled.source == ControlSource::controller || scaled.source == ControlSource::pressure)) {
+    if (by == "level") {
+      setting.by = ControlSource::note;
+    } else if (read_source(by, scaled) && (scaled.source == ControlSource::controller ||
+                                           scaled.source == ControlSource::pressure)) {
       setting.by = scaled.source;
       setting.number = scaled.number;
     } else {
-      reader.fail(*table.get("by"), "'by' must be \"pressure\", or \"cc0\" to \"cc119\"");
+      reader.fail(*table.get("by"),
+                  "'by' must be \"level\", \"pressure\", or \"cc0\" to \"cc119\"");
     }
   }
   preset.lfos.push_back(std::move(setting));

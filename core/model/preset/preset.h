@@ -90,8 +90,9 @@ ControlSetting on_key(ControlSetting control, double key);
 struct LfoSetting {
   std::string name;
   Lfo lfo;
-  std::optional<ControlSource> by;  // controller or pressure that scales the depth
-  int number = 0;                   // of the controller
+  // Scales the depth: a controller, the pressure, or for `note` the energy of the note's level.
+  std::optional<ControlSource> by;
+  int number = 0;  // of the controller
   bool operator==(const LfoSetting&) const = default;
 };
 

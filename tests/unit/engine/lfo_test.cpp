@@ -55,6 +55,13 @@ double greatest(const std::vector<Reading>& readings, double from_s, double to_s
   return most;
 }
 
+// Returns the reading nearest to a time.
+double at(const std::vector<Reading>& readings, double time_s) {
+  return std::ranges::min_element(readings, {},
+                                  [&](const Reading& r) { return std::fabs(r.time_s - time_s); })
+      ->value;
+}
+
 // Rate of the upward zero crossings after `from_s`.
 double rate_of(const std::vector<Reading>& readings, double from_s) {
   std::vector<double> crossings;
@@ -100,6 +107,27 @@ TEST_CASE("a vibrato has its rate and depth, after its delay and fade", "[lfo]")
     CHECK(greatest(cents, 0.9, 1.1) == Approx(25.0).epsilon(0.15));  // the 3rd crest, at 0.95 s
     CHECK(greatest(cents, 2.0, 4.0) == Approx(50.0).epsilon(0.05));
     CHECK(rate_of(cents, 1.5) == Approx(5.0).epsilon(0.01));
+  }
+}
+
+// The pitch of a struck drum: 80 cents sharp at first, 80/e after 0.1 s. A note that is 6 dB below
+// the loudest has a quarter of its energy, so it starts 20 cents sharp.
+TEST_CASE("a fall starts at its depth, which may follow the energy of the note", "[lfo]") {
+  LfoSetting tension{.name = "t", .lfo = {.rate_hz = 10.0, .shape = LfoShape::fall}};
+  tension.by = ControlSource::note;
+  for (const double level_db : {0.0, -6.0206}) {
+    Preset preset = moved(tension, "pitch", -80.0, 80.0);
+    for (ControlSetting& control : preset.controls) {
+      if (control.source == ControlSource::note) {
+        control.has_level = true;
+        control.low_db = control.high_db = level_db;
+      }
+    }
+    const auto cents = cents_of(heard(preset, one_note));
+    const double start = 80.0 * std::pow(10.0, level_db / 10.0);
+    CHECK(at(cents, 0.1) == Approx(start / std::numbers::e).margin(1.0));
+    CHECK(at(cents, 0.2) == Approx(start * std::exp(-2.0)).margin(1.0));
+    CHECK(std::fabs(at(cents, 1.0)) < 0.5);
   }
 }
 
