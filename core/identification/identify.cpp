@@ -705,6 +705,58 @@ std::vector<Found> all_found(Search& search) {
   return all;
 }
 
+FallingPitch fall_of(const FoundGlide& found, double rate_hz) {
+  constexpr double cents = 1200.0 / std::numbers::ln2;
+  return {.cents = {cents * found.glide.size, cents * found.deviation.size},
+          .decay_s = {found.glide.decay / rate_hz, found.deviation.decay / rate_hz}};
+}
+
+// Gives the modes the damping that they have beside the glide, and adds to their deviations how far
+// they move if the glide moves by its own. `modes` begin at the first analysed sample, `all` at the
+// blow.
+void follow_glide(std::vector<Found>& all, const std::vector<DampedMode>& modes,
+                  const FoundGlide& falling, const Blow& blow, const Progress& progress) {
+  const Glide& glide = falling.glide;
+  for (const Glide& step : falling.steps) {
+    const Channels straight = without_glide(
+        blow.channels, {glide.size + step.size, glide.decay + step.decay, glide.damping});
+    DampedFit fit(straight);
+    fit.set_poles(poles_of(modes));
+    fit.refine(4, settled, progress);
+    for (std::size_t k = 0; k < all.size() && k < fit.modes().size(); ++k) {
+      DampedDeviation& deviation = all[k].deviation;
+      const Complex moved = fit.modes()[k].log_z - modes[k].log_z;
+      deviation.alpha = std::hypot(deviation.alpha, moved.real());
+      deviation.omega = std::hypot(deviation.omega, moved.imag());
+      for (std::size_t c = 0; c < deviation.c.size(); ++c) {
+        const double size = std::abs(fit.modes()[k].c[c] - modes[k].c[c]);
+        deviation.c[c] = std::hypot(deviation.c[c], size / std::numbers::sqrt2);
+      }
+    }
+  }
+  for (Found& found : all) {
+    found.mode.log_z.real(-glide.true_damping(-found.mode.log_z.real()));
+  }
+}
+
+// Returns what the modes leave of the sound, which begins `skipped` samples after the blow.
+Channels rest_beside(const Glide& glide, const Channels& sound, const std::vector<Found>& modes,
+                     double skipped) {
+  Channels rest = sound;
+  for (std::size_t n = 0; n < sound[0].size(); ++n) {
+    const auto time = static_cast<double>(n);
+    const double phase = glide.straight(time) + skipped;
+    for (const Found& found : modes) {
+      const Complex turned = std::polar(std::exp(found.mode.log_z.real() * (time + skipped)),
+                                        found.mode.log_z.imag() * phase);
+      for (std::size_t c = 0; c < rest.size(); ++c) {
+        rest[c][n] -= times(found.mode.c[c], turned).real();
+      }
+    }
+  }
+  return rest;
+}
+
 // Returns the time, in samples from the onset, at which one impulse would best explain all phases:
 // there every mode of a body that starts at rest passes through 0.
 double time_of_impulse(const std::vector<Found>& all, double rate_hz) {
@@ -817,18 +869,16 @@ void warn_of_recording(const Blow& blow, Identification& found) {
   }
 }
 
-}  // namespace
-
-Result<Identification> identify(const Recording& recording, const IdentifyOptions& options,
-                                const Progress& progress) try {
-  progress.stage("searching for the blow");
+// Identifies the modes beside a glide.
+Result<Identification> identify_beside(const FoundGlide& falling, const Recording& recording,
+                                       const IdentifyOptions& options, const Progress& progress) {
   auto blow = find_blow(recording);
   if (!blow) {
     return blow.error();
   }
   const double rate_hz = recording.rate_hz;
   Identification made{.rate_hz = rate_hz, .onset_s = static_cast<double>(blow->first) / rate_hz};
-  made.sound = std::move(blow->channels);
+  made.sound = without_glide(blow->channels, falling.glide);
   const std::size_t least = std::max(choices[0], options.least_modes);
   const std::size_t most = std::max({least_fitted, least, options.most_modes});
   std::optional<Search> search(std::in_place, made.sound, least, most, progress);
@@ -837,7 +887,7 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
     auto whole = find_blow(recording, false);
     if (!explains_clipped(search->fit(), *whole, blow->skipped)) {
       blow = std::move(whole);
-      made.sound = std::move(blow->channels);
+      made.sound = without_glide(blow->channels, falling.glide);
       search.emplace(made.sound, least, most, progress);
       search_all(*search, rate_hz);
     }
@@ -847,7 +897,7 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
   // A residual at the level of rounding errors contains no blow.
   const double rest_share = search->fit().rest_energy() / std::max(energy_in(made.sound), 1e-300);
   if (const std::size_t head = blow_frames(search->fit().rest(), rate_hz);
-      head > 0 && rest_share > rounding) {
+      head > 0 && rest_share > rounding && falling.glide.size == 0.0) {
     std::vector<std::vector<double>> later = made.sound;
     for (std::vector<double>& channel : later) {
       channel.erase(channel.begin(), channel.begin() + static_cast<std::ptrdiff_t>(head));
@@ -963,12 +1013,18 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
   const double time_zero = time_of_impulse(kept, rate_hz);
   made.time_zero_s = made.onset_s + time_zero / rate_hz;
   std::vector<DampedMode> modes;
-  for (const Found& found : kept) {
-    made.modes.push_back(measured(found, rate_hz, time_zero));
+  for (Found& found : kept) {
     modes.push_back(found.mode);
     for (Complex& c : modes.back().c) {
       c *= std::exp(found.mode.log_z * skipped);
     }
+  }
+  if (falling.glide.size > 0.0) {
+    made.fall = fall_of(falling, rate_hz);
+    follow_glide(kept, modes, falling, *blow, progress);
+  }
+  for (const Found& found : kept) {
+    made.modes.push_back(measured(found, rate_hz, time_zero));
   }
   search->fit().set_modes(std::move(modes));
   made.residual = search->fit().rest();
@@ -977,8 +1033,11 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
       x -= search->fit().constant()[c];
     }
   }
-  made.residual_db =
-      decibels(search->fit().rest_energy() / std::max(energy_in(made.sound), 1e-300));
+  if (falling.glide.size > 0.0) {
+    made.sound = std::move(blow->channels);
+    made.residual = rest_beside(falling.glide, made.sound, kept, skipped);
+  }
+  made.residual_db = decibels(energy_in(made.residual) / std::max(energy_in(made.sound), 1e-300));
   made.octaves = by_octave(made.sound, made.residual, rate_hz);
   if (made.modes.size() < options.least_modes) {
     made.warnings.push_back("only " + std::to_string(made.modes.size()) + " modes were found");
@@ -990,6 +1049,32 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
         " % of its energy; the recording does not sound like the ringing of one blow");
   }
   return made;
+}
+
+}  // namespace
+
+Result<Identification> identify(const Recording& recording, const IdentifyOptions& options,
+                                const Progress& progress) try {
+  constexpr double little_db = 0.2;
+  progress.stage("searching for the blow");
+  const auto blow = find_blow(recording);
+  if (!blow) {
+    return blow.error();
+  }
+  auto constant = identify_beside({}, recording, options, progress);
+  const FoundGlide falling = find_glide(blow->channels, recording.rate_hz, progress);
+  if (falling.glide.size == 0.0) {
+    return constant;
+  }
+  // Groups of close modes describe a falling pitch as well. The glide is better if it leaves less,
+  // or about as little with fewer modes.
+  auto gliding = identify_beside(falling, recording, options, progress);
+  if (gliding && constant) {
+    const bool has_fewer = gliding->modes.size() < constant->modes.size();
+    const double most_db = constant->residual_db + (has_fewer ? little_db : -little_db);
+    return gliding->residual_db < most_db ? gliding : constant;
+  }
+  return gliding ? gliding : constant;
 } catch (const Stopped&) {
   return Error{stopped};
 }

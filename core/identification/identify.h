@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/identification/blow.h"
+#include "core/identification/glide.h"
 #include "core/progress.h"
 #include "core/result.h"
 
@@ -28,6 +29,12 @@ struct IdentifiedMode {
   // [channel] The mode is amplitude e^(-alpha t) cos(2 pi f t + phase) from time 0 on.
   std::vector<Measured> amplitude;
   std::vector<Measured> phase_rad;  // -pi to pi
+};
+
+// All pitches start this many cents high. The cents fall by the factor e in each `decay_s`.
+struct FallingPitch {
+  Measured cents;  // 0: the pitch does not fall.
+  Measured decay_s;
 };
 
 struct OctaveResidual {
@@ -56,7 +63,8 @@ struct Identification {
   double time_zero_s = 0.0;  // Time of the single impulse that would set all modes going from 0.
   double skipped_s = 0.0;   // Time skipped after the onset: clipped samples and the contact itself.
   double analysed_s = 0.0;  // Length of the analysed sound after that.
-  std::vector<IdentifiedMode> modes;  // Sorted by ascending frequency.
+  FallingPitch fall;        // Of all modes, from the first analysed sample on.
+  std::vector<IdentifiedMode> modes;  // Sorted by ascending frequency, after the fall.
   // Energy that the modes leave unexplained, relative to the sound, constants excluded.
   double residual_db = 0.0;
   std::vector<Unexplained> choices;  // The same for 5, 10, 20 and 40 modes, if there are so many.

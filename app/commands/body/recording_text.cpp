@@ -70,6 +70,15 @@ std::string header(const Identification& found, const std::string& source) {
     }
   }
   text += " dB by octave.\n";
+  if (found.fall.cents.value > 0.0) {
+    text += "# Its pitch starts " +
+            known_digits(found.fall.cents.value, found.fall.cents.deviation) + " +-" +
+            formatted("%.1g", found.fall.cents.deviation) +
+            " cents higher and falls with a time constant of " +
+            known_digits(found.fall.decay_s.value, found.fall.decay_s.deviation) + " +-" +
+            formatted("%.1g", found.fall.decay_s.deviation) +
+            " s. These are the modes after the fall; a preset (-o NAME.toml) plays both.\n";
+  }
   for (const std::string& warning : found.warnings) {
     text += "# Warning: " + one_line(warning) + ".\n";
   }
@@ -177,6 +186,11 @@ std::string identification_json(const Identification& found, double mass) {
                  {"time_zero_s", found.time_zero_s},
                  {"analysed_s", found.analysed_s},
                  {"mass", mass},
+                 {"fall",
+                  {{"cents", found.fall.cents.value},
+                   {"cents_deviation", found.fall.cents.deviation},
+                   {"decay_s", found.fall.decay_s.value},
+                   {"decay_deviation_s", found.fall.decay_s.deviation}}},
                  {"modes", modes},
                  {"residual_db", found.residual_db},
                  {"choices", choices},
