@@ -107,7 +107,7 @@ int recording_body(const BodyOptions& options) {
   if (options.output.ends_with(".toml")) {
     const std::string file = options.output.substr(0, options.output.size() - 5) + ".mdl";
     const std::string preset =
-        played_preset(*found, noise, file.substr(file.rfind('/') + 1), source);
+        played_preset(*found, noise, label, file.substr(file.rfind('/') + 1), source);
     model = played_model(*found, noise, label, source, options.mass);
     if (const int code = write_output(file, model, options.force)) {
       return code;

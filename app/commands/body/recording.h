@@ -26,12 +26,13 @@ std::string label_of_file(const std::string& path);
 std::string body_model(const Identification& found, const std::string& label,
                        const std::string& source, double mass);
 
-// Return a model of a body with knobs, one place and input for each band of noise, and a preset
-// that plays this model: keys strike it and play the noise.
+// Return a model of a body with knobs and of a second body with one input for each band of noise,
+// and a preset that plays this model: keys strike it and play the noise.
 std::string played_model(const Identification& found, const std::vector<NoiseBand>& noise,
                          const std::string& label, const std::string& source, double mass);
 std::string played_preset(const Identification& found, const std::vector<NoiseBand>& noise,
-                          const std::string& model, const std::string& source);
+                          const std::string& label, const std::string& model,
+                          const std::string& source);
 
 // Returns the residuals that fewer or more modes would leave, as a sentence, or nothing.
 std::string choices_of(const Identification& found, const std::string& before,

@@ -107,6 +107,11 @@ void remove_overlap(std::vector<Carrier>& carriers) {
   }
 }
 
+// Returns the label of the body that carries the noise, which keys do not retune.
+std::string noise_label(const std::string& label) {
+  return label + "_noise";
+}
+
 // Returns the coordinate of a place.
 std::string place_of(std::size_t places, std::size_t number) {
   return five_digits(static_cast<double>(number) / static_cast<double>(places - 1));
@@ -178,9 +183,6 @@ std::string played_model(const Identification& found, const std::vector<NoiseBan
     names.push_back("mic" + std::to_string(c + 1));
     names.push_back("velocity" + std::to_string(c + 1));
   }
-  for (std::size_t b = 0; b < noise.size(); ++b) {
-    names.push_back("noise" + std::to_string(b + 1));
-  }
   std::string text =
       "# " + source + " as an instrument: " + counted(found.modes.size(), "mode", "modes") +
       ", and " + counted(noise.size(), "band", "bands") +
@@ -193,13 +195,6 @@ std::string played_model(const Identification& found, const std::vector<NoiseBan
       "@place param " +
       place_of(names.size(), 1) + "\n@" + label + " body " + print_number(mass) + " " +
       joined(names, " ") + "\n";
-  const std::string zeros = [&] {
-    std::string some;
-    for (std::size_t b = 0; b < noise.size(); ++b) {
-      some += " 0";
-    }
-    return some;
-  }();
   for (std::size_t k = 0; k < found.modes.size(); ++k) {
     const double hertz = found.modes[k].frequency_hz.value;
     const double t60_s = found.modes[k].t60_s.value;
@@ -211,18 +206,29 @@ std::string played_model(const Identification& found, const std::vector<NoiseBan
     for (std::size_t c = 0; c < channels; ++c) {
       text += " " + five_digits(shapes[k].position[c]) + " " + five_digits(shapes[k].velocity[c]);
     }
-    text += zeros + "\n";
+    text += "\n";
   }
   std::vector<Carrier> carriers;
   for (const NoiseBand& band : noise) {
     carriers.emplace_back(band, lowest_hz);
   }
   remove_overlap(carriers);
+  const std::string carrier = noise_label(label);
+  if (!noise.empty()) {
+    text += "@" + carrier + " body " + print_number(mass);
+    for (std::size_t c = 0; c < channels; ++c) {
+      text += " mic" + std::to_string(c + 1);
+    }
+    for (std::size_t b = 0; b < noise.size(); ++b) {
+      text += " noise" + std::to_string(b + 1);
+    }
+    text += "\n";
+  }
   for (std::size_t b = 0; b < noise.size(); ++b) {
-    text += "@" + label + "_n" + std::to_string(b + 1) + " mode @" + label + " " +
-            five_digits(carriers[b].hertz) + " " + five_digits(carriers[b].t60_s) + " 0 0 0";
+    text += "@" + carrier + "_" + std::to_string(b + 1) + " mode @" + carrier + " " +
+            five_digits(carriers[b].hertz) + " " + five_digits(carriers[b].t60_s);
     for (const double level : carriers[b].band.level) {
-      text += " " + five_digits(mass * level / carriers[b].response()) + " 0";
+      text += " " + five_digits(mass * level / carriers[b].response());
     }
     for (std::size_t other = 0; other < noise.size(); ++other) {
       text += other == b ? " 1" : " 0";
@@ -231,19 +237,23 @@ std::string played_model(const Identification& found, const std::vector<NoiseBan
   }
   text += "@in1 frcInput [@" + label + " place]\n";
   for (std::size_t b = 0; b < noise.size(); ++b) {
-    text += "@in" + std::to_string(b + 2) + " frcInput [@" + label + " noise" +
+    text += "@in" + std::to_string(b + 2) + " frcInput [@" + carrier + " noise" +
             std::to_string(b + 1) + "]\n";
   }
   for (std::size_t c = 0; c < channels; ++c) {
     const std::string number = std::to_string(c + 1);
     text += "@out" + number + " posOutput [@" + label + " mic" + number + "]\n@out" + number +
             " velOutput [@" + label + " velocity" + number + "]\n";
+    if (!noise.empty()) {
+      text += "@out" + number + " posOutput [@" + carrier + " mic" + number + "]\n";
+    }
   }
   return text;
 }
 
 std::string played_preset(const Identification& found, const std::vector<NoiseBand>& noise,
-                          const std::string& model, const std::string& source) {
+                          const std::string& label, const std::string& model,
+                          const std::string& source) {
   constexpr double wanted_peak = 0.25;  // -12 dBFS
   double peak = 1e-30;
   for (const std::vector<double>& channel : found.sound) {
@@ -251,7 +261,7 @@ std::string played_preset(const Identification& found, const std::vector<NoiseBa
       peak = std::max(peak, std::fabs(x));
     }
   }
-  const std::size_t places = 3 + 2 * found.sound.size() + noise.size();
+  const std::size_t places = 3 + 2 * found.sound.size();
   const double cents =
       1200.0 * std::log2(loudest_hz(found) / found.modes.front().frequency_hz.value);
   const double semitones = std::round(cents / 100.0);
@@ -262,6 +272,7 @@ std::string played_preset(const Identification& found, const std::vector<NoiseBa
       ". The wheel moves the blow.\"\nvoices = 8\ntranspose = " + five_digits(0.0 - semitones) +
       "\nflattening_cents = " + five_digits(100.0 * semitones - cents) +
       "\ngain = " + five_digits(wanted_peak / peak) +
+      (noise.empty() ? std::string() : "\nfixed = [\"" + noise_label(label) + "\"]") +
       "\nhardness = \"mallet\"\n\n[parameters]\nmallet = { value = 0, range = [-0.5, 0.5] }\nring "
       "= { value = 1, range = [0.5, 2] }\n"
       "damp = { value = 0, range = [0, 20] }\nplace = { value = " +
@@ -272,6 +283,15 @@ std::string played_preset(const Identification& found, const std::vector<NoiseBa
             "\"\nhow = \"noise\"\nrange = [0.06, 1.0]\ncurve = \"exponential\"\nlength_ms = [" +
             ms + ", " + ms + "]\nband_hz = [" + five_digits(noise[b].low_hz) + ", " +
             five_digits(noise[b].high_hz) + "]\n";
+  }
+  // A longer time constant than 100 s is no fall.
+  if (const double decays_per_s = 1.0 / found.fall.decay_s.value;
+      found.fall.cents.value > 0.0 && decays_per_s >= 0.01) {
+    const std::string cents = five_digits(found.fall.cents.value);
+    text += "\n[[lfo]]\nname = \"tension\"\nshape = \"fall\"\nrate_hz = " +
+            five_digits(std::min(50.0, decays_per_s)) +
+            "\nby = \"level\"\n\n[[control]]\nfrom = \"tension\"\nto = \"pitch\"\nrange = [-" +
+            cents + ", " + cents + "]\n";
   }
   return text + knob("cc1", "place", "Place", range) +
          knob("cc16", "mallet", "Mallet", "[-0.5, 0.5]") +

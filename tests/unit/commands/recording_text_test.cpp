@@ -119,7 +119,7 @@ TEST_CASE("The preset names its model, its knobs and a burst for each band", "[r
   const Identification found = identified({ringing(known, 1.0)});
   const std::vector<NoiseBand> noise = {
       {.low_hz = 500.0, .high_hz = 1500.0, .t60_s = 0.1, .level = {0.2}}};
-  const std::string text = played_preset(found, noise, "bowl.mdl", "bowl.wav");
+  const std::string text = played_preset(found, noise, "bowl", "bowl.mdl", "bowl.wav");
   CHECK(text.find("model = \"bowl.mdl\"") == 0);
   for (const char* const knob :
        {"mallet = {", "ring = {", "damp = {", "place = {", "to = \"in2\"\nhow = \"noise\""}) {
@@ -127,6 +127,51 @@ TEST_CASE("The preset names its model, its knobs and a burst for each band", "[r
     CHECK(text.find(knob) != std::string::npos);
   }
   CHECK(text.find("length_ms = [100, 100]") != std::string::npos);
+  CHECK(text.find("fixed = [\"bowl_noise\"]") != std::string::npos);
+}
+
+TEST_CASE("The preset of a recording plays the fall of its pitch on all keys", "[recording_text]") {
+  Identification found = identified({ringing({{220.0, 0.5, 0.5, 0.0}}, 1.0)});
+  found.fall = {.cents = {300.0, 1.0}, .decay_s = {0.1, 0.001}};
+  const std::vector<NoiseBand> noise = {
+      {.low_hz = 14000.0, .high_hz = 20000.0, .t60_s = 0.02, .level = {1e-4}}};
+  const auto folder = TemporaryFolder::make();
+  REQUIRE(folder);
+  std::ofstream(folder->file("bowl.mdl")) << played_model(found, noise, "bowl", "bowl.wav", 40.0);
+  std::ofstream(folder->file("bowl.toml"))
+      << played_preset(found, noise, "bowl", "bowl.mdl", "bowl.wav");
+  const auto scene = load_scene(folder->file("bowl.toml"), {});
+  REQUIRE(scene);
+  for (const int key : {57, 93}) {  // A3 and A6
+    INFO("key " << key);
+    std::vector<std::string> warnings;
+    auto compiled = compile_scene(*scene, {.rate_hz = 44100.0}, warnings);
+    REQUIRE(compiled);
+    Player player(*std::move(compiled));
+    Event loudest = note_on(0, key);
+    loudest.value = 1.0;
+    player.run(44100, {loudest});
+    std::vector<double> y = player.y();
+    REQUIRE(peak(y) > 0.01);
+    // Upward zero crossings in 50 ms: the mean of 300 cents e^(-t / 0.1 s) over this time.
+    const auto cents_at = [&](double time_s) {
+      std::vector<double> crossings;
+      const auto first = static_cast<std::size_t>(time_s * 44100.0);
+      for (std::size_t n = first; n < first + 2205; ++n) {
+        if (y[n] < 0.0 && y[n + 1] >= 0.0) {
+          crossings.push_back(static_cast<double>(n) + y[n] / (y[n] - y[n + 1]));
+        }
+      }
+      REQUIRE(crossings.size() > 2);
+      const double period =
+          (crossings.back() - crossings.front()) / static_cast<double>(crossings.size() - 1);
+      return 1200.0 * std::log2(44100.0 / period / (220.0 * std::exp2((key - 57) / 12.0)));
+    };
+    for (const double time_s : {0.1, 0.2}) {
+      const double mean = 300.0 * 2.0 * (std::exp(-time_s / 0.1) - std::exp(-time_s / 0.1 - 0.5));
+      CHECK(cents_at(time_s) == Approx(mean).margin(6.0));
+    }
+  }
 }
 
 TEST_CASE("A played recording has its loudest mode at the key, and no key is louder",
@@ -138,7 +183,7 @@ TEST_CASE("A played recording has its loudest mode at the key, and no key is lou
                                                     {220.0, 0.5, 0.5, 0.0},
                                                     {330.0, 0.4, 0.4, std::numbers::pi}},
                                                    1.0)});
-  const std::string text = played_preset(found, {}, "bowl.mdl", "bowl.wav");
+  const std::string text = played_preset(found, {}, "bowl", "bowl.mdl", "bowl.wav");
   INFO(text);
   const auto folder = TemporaryFolder::make();
   REQUIRE(folder);
