@@ -278,7 +278,7 @@ class Search {
       had = fit_.modes().size();
       std::vector<Complex> best =
           explaining(pool, std::numbers::pi / static_cast<double>(frames()));
-      best.resize(std::min(best.size(), 1 + (count - had) / 5));
+      best.resize(std::min(best.size(), 1 + (count - had) / 12));
       add(best);
       fit_.refine(2, roughly_settled, progress_);
     }
