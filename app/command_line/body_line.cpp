@@ -32,6 +32,7 @@ const char* const examples =
     "Examples:\n"
     "  ressort body bowl.wav -o bowl.mdl --modes 20 --picture bowl.svg\n"
     "  ressort body tom.wav -o Tom.toml     # a preset with its model, Tom.mdl, and its noise\n"
+    "  ressort body soft.wav loud.wav -o Tom.toml     # velocity goes from the first to the last\n"
     "  ressort body bell.stl --material bronze --scale 0.001 --place rim=150,0,0 -o bell.mdl\n"
     "  ressort body gong.obj --material bronze --scale 0.001 --thickness 1.2 -o gong.mdl\n"
     "  ressort body bar.obj --young 11e9 --poisson 0.25 --density 750 --loss 0.01 -o bar.mdl\n"
@@ -196,6 +197,10 @@ void add_body(CLI::App& app, int& code) {
             "loss factor: T60 = 2.2 / (LOSS * frequency); a curve only for a statistical body");
   add_overwrite(*command, request.force);
   command->option_defaults()->group("Recording");
+  command
+      ->add_option("OTHERS", request.recording.others,
+                   "more recordings of the same object: harder blows, other places")
+      ->type_name("PATH");
   add_recording(*command, request.recording);
   command->option_defaults()->group("Solid");
   add_solid(*command, request.solid);

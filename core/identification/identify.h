@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -72,6 +73,9 @@ struct Identification {
   std::vector<std::string> warnings;          // Warnings about the recording and the result.
   std::vector<std::vector<double>> sound;     // The analysed sound.
   std::vector<std::vector<double>> residual;  // The analysed sound minus the modes.
+  // [recording][mode] Displacement at the struck place of each recording of several, relative to
+  // the one that the other members describe. Empty: there is one recording.
+  std::vector<std::vector<double>> hits;
 };
 
 // A body cannot have modes above this frequency at 44,100 Hz, so the search ends here.
@@ -81,5 +85,12 @@ inline constexpr double highest_mode_hz = 0.45 * 44100.0;
 // audio]
 Result<Identification> identify(const Recording& recording, const IdentifyOptions& options,
                                 const Progress& progress);
+
+// Identifies the modes of several recordings of one object with the same rate and number of
+// channels, such as a soft blow, a loud one and one at the edge. All have the same poles; the
+// shortest recording limits their length. Describes the recording with the most energy. [any
+// thread but audio]
+Result<Identification> identify_together(std::span<const Recording> recordings,
+                                         const IdentifyOptions& options, const Progress& progress);
 
 }  // namespace ressort::identification

@@ -16,10 +16,11 @@ namespace ressort::commands {
 // Options for recordings.
 struct BodyOptions {
   std::string input;
-  std::string output;   // empty: stdout
-  std::string picture;  // .svg; empty: none
-  std::string listen;   // folder for sounds; empty: none
-  bool force = false;   // overwrites existing files
+  std::vector<std::string> others;  // more recordings of the same object
+  std::string output;               // empty: stdout
+  std::string picture;              // .svg; empty: none
+  std::string listen;               // folder for sounds; empty: none
+  bool force = false;               // overwrites existing files
   bool as_json = false;
   std::optional<std::size_t> modes;  // all that stand above the noise if not given
   double floor_db = -70.0;           // energy of the weakest mode, relative to the strongest

@@ -43,16 +43,26 @@ Result<Recording> read_recording(const std::string& path, bool& was_longer) {
 
 }  // namespace
 
-Result<Identification> identify_recording(const std::string& path, const IdentifyOptions& options,
-                                          const Progress& progress) {
+Result<Identification> identify_recordings(std::span<const std::string> paths,
+                                           const IdentifyOptions& options,
+                                           const Progress& progress) {
   bool was_longer = false;
-  const auto recording = read_recording(path, was_longer);
-  if (!recording) {
-    return recording.error();
+  std::vector<Recording> recordings;
+  for (const std::string& path : paths) {
+    auto recording = read_recording(path, was_longer);
+    if (!recording) {
+      return recording.error();
+    }
+    if (!recordings.empty() && (recording->rate_hz != recordings[0].rate_hz ||
+                                recording->channels.size() != recordings[0].channels.size())) {
+      return Error{"'" + path + "' has another sample rate or number of channels than '" +
+                   paths[0] + "'; convert it first"};
+    }
+    recordings.push_back(*std::move(recording));
   }
-  auto found = identify(*recording, options, progress);
+  auto found = identify_together(recordings, options, progress);
   if (!found) {
-    return Error{"'" + path + "': " + found.error().message +
+    return Error{"'" + joined(paths, "', '") + "': " + found.error().message +
                  (was_longer ? " in its first " + fixed(longest_read_s, 0) + " s" : "")};
   }
   if (was_longer) {
@@ -62,7 +72,8 @@ Result<Identification> identify_recording(const std::string& path, const Identif
 }
 
 int recording_body(const BodyOptions& options) {
-  const std::string read[] = {options.input};
+  std::vector<std::string> read = {options.input};
+  read.insert(read.end(), options.others.begin(), options.others.end());
   for (const std::string& written : {options.output, options.picture}) {
     if (auto spared = check_not_input(written, read); !spared) {
       return reject(spared.error().message);
@@ -76,11 +87,11 @@ int recording_body(const BodyOptions& options) {
   }
   const Progress progress = report_stages(options.input);
   const auto found =
-      identify_recording(options.input,
-                         {.most_modes = options.modes.value_or(IdentifyOptions().most_modes),
-                          .least_modes = options.modes.value_or(0),
-                          .floor_db = options.floor_db},
-                         progress);
+      identify_recordings(read,
+                          {.most_modes = options.modes.value_or(IdentifyOptions().most_modes),
+                           .least_modes = options.modes.value_or(0),
+                           .floor_db = options.floor_db},
+                          progress);
   if (!found) {
     return reject(found.error().message);
   }

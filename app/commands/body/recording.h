@@ -1,6 +1,7 @@
 // app/commands: the modes in a recording, as a model, as JSON and as a figure.
 #pragma once
 
+#include <span>
 #include <string>
 
 #include "app/commands/gallery/sound.h"
@@ -12,15 +13,16 @@
 
 namespace ressort::commands {
 
-// Finds modes in the first minute of a sound file; warns if the file is longer. Errors have the
-// file name. Blocks. [any thread but audio]
-Result<Identification> identify_recording(const std::string& path, const IdentifyOptions& options,
-                                          const Progress& progress);
+// Finds the modes of one object in the first minute of each sound file; warns if one is longer.
+// Errors have the file name. Blocks. [any thread but audio]
+Result<Identification> identify_recordings(std::span<const std::string> paths,
+                                           const IdentifyOptions& options,
+                                           const Progress& progress);
 
 // Makes a label of a file name, from its letters, digits and _; "body" if none is left.
 std::string label_of_file(const std::string& path);
 
-// Returns a model of a body with the place `hit` and one place per channel (`mic`, `left` and
+// Returns a model of a body with the struck places and one place per channel (`mic`, `left` and
 // `right`, or `mic1` and so on), its modes with their standard deviations, a force input, and a
 // position output per channel.
 std::string body_model(const Identification& found, const std::string& label,
@@ -33,6 +35,12 @@ std::string played_model(const Identification& found, const std::vector<NoiseBan
 std::string played_preset(const Identification& found, const std::vector<NoiseBand>& noise,
                           const std::string& label, const std::string& model,
                           const std::string& source);
+
+// Returns the names of the struck places: `hit`, or `hit1` and so on if there are several
+// recordings.
+std::vector<std::string> struck_places(const Identification& found);
+// Returns the displacement of a mode at the place of a recording, relative to the described one.
+double hit_of(const Identification& found, std::size_t recording, std::size_t mode);
 
 // Returns the residuals that fewer or more modes would leave, as a sentence, or nothing.
 std::string choices_of(const Identification& found, const std::string& before,

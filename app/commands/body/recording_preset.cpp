@@ -119,11 +119,11 @@ std::string place_of(std::size_t places, std::size_t number) {
 
 // One blow of the hand: the same in both directions in turn, so that chords add no offset. Its
 // force is the same on all keys, because the velocities that are heard would grow with the pitch.
-std::string strike(double direction, int turn) {
+std::string strike(double direction, int turn, const std::string& longest_ms) {
   const std::string one = direction < 0.0 ? "-1.0" : "1.0";
   return "\n[[control]]\nfrom = \"note\"\nto = \"in1\"\nhow = \"impulse\"\nrange = [" + one + ", " +
          one + "]\nlevel_db = [-24.0, 0.0]\nround_robin = [" + std::to_string(turn) +
-         ", 2]\nlength_ms = [4.0, 0.05]\nfollows_pitch = false\n";
+         ", 2]\nlength_ms = [" + longest_ms + ", 0.05]\nfollows_pitch = false\n";
 }
 
 std::string knob(const std::string& from, const std::string& to, const std::string& name,
@@ -142,6 +142,29 @@ double loudest_hz(const Identification& found) {
     return square * mode.t60_s.value;
   };
   return std::ranges::max_element(found.modes, {}, energy)->frequency_hz.value;
+}
+
+// Returns the energy of the modes in one of several recordings.
+double energy_at(const Identification& found, std::size_t recording) {
+  double energy = 0.0;
+  for (std::size_t k = 0; k < found.modes.size(); ++k) {
+    for (const Measured& amplitude : found.modes[k].amplitude) {
+      const double size = amplitude.value * hit_of(found, recording, k);
+      energy += size * size * found.modes[k].t60_s.value;
+    }
+  }
+  return energy;
+}
+
+// Returns whether each of several recordings is louder than the one before, by 2 dB or more. Their
+// blows are then from the softest to the hardest.
+bool gets_louder(const Identification& found) {
+  constexpr double louder = 1.58;
+  bool is_louder = found.hits.size() > 1;
+  for (std::size_t r = 1; r < found.hits.size(); ++r) {
+    is_louder = is_louder && energy_at(found, r) > louder * energy_at(found, r - 1);
+  }
+  return is_louder;
 }
 
 // Returns the modes as they are when their sum is smallest, in the first millisecond, so that they
@@ -178,22 +201,30 @@ std::string played_model(const Identification& found, const std::vector<NoiseBan
   const std::vector<BodyShape> shapes = body_shapes(starting_modes(found), mass);
   const double lowest_hz = found.modes.front().frequency_hz.value;
   const std::size_t channels = found.sound.size();
-  std::vector<std::string> names = {"centre", "hit", "edge"};
+  const bool is_one = found.hits.empty();
+  std::vector<std::string> names =
+      is_one ? std::vector<std::string>{"centre", "hit", "edge"} : struck_places(found);
+  // The level of a note follows its velocity, so blows of several strengths get the same energy.
+  std::vector<double> gains(found.hits.size(), 1.0);
+  for (std::size_t r = 0; r < gains.size() && gets_louder(found); ++r) {
+    gains[r] = std::sqrt(energy_at(found, gains.size() - 1) / energy_at(found, r));
+  }
   for (std::size_t c = 0; c < channels; ++c) {
     names.push_back("mic" + std::to_string(c + 1));
     names.push_back("velocity" + std::to_string(c + 1));
   }
   std::string text =
       "# " + source + " as an instrument: " + counted(found.modes.size(), "mode", "modes") +
-      ", and " + counted(noise.size(), "band", "bands") +
-      " of noise.\n"
-      "# `place` moves the blow from a centre past the recorded place, `hit`, to an\n"
-      "# edge. High modes are weaker at the centre and stronger at the edge, by 3 dB\n"
-      "# per octave. The velocities give the modes their phases.\n"
+      ", and " + counted(noise.size(), "band", "bands") + " of noise.\n" +
+      (is_one ? "# `place` moves the blow from a centre past the recorded place, `hit`, to an\n"
+                "# edge. High modes are weaker at the centre and stronger at the edge, by 3 dB\n"
+                "# per octave."
+              : "# `place` moves the blow from that of the first recording to that of the last.") +
+      " The velocities give the modes their phases.\n"
       "@ring param 1.    # scales all decay times\n"
       "@damp param 0.    # additional loss in 1/s per kHz\n"
       "@place param " +
-      place_of(names.size(), 1) + "\n@" + label + " body " + print_number(mass) + " " +
+      place_of(names.size(), is_one ? 1 : 0) + "\n@" + label + " body " + print_number(mass) + " " +
       joined(names, " ") + "\n";
   for (std::size_t k = 0; k < found.modes.size(); ++k) {
     const double hertz = found.modes[k].frequency_hz.value;
@@ -201,8 +232,15 @@ std::string played_model(const Identification& found, const std::vector<NoiseBan
     const double tilt = std::sqrt(hertz / lowest_hz);
     text += "@" + label + "_" + std::to_string(k + 1) + " mode @" + label + " " +
             print_number(hertz) + " [" + five_digits(t60_s) + "*ring/(1+" +
-            five_digits(1e-3 * hertz * t60_s) + "*damp)] " + five_digits(shapes[k].hit / tilt) +
-            " " + five_digits(shapes[k].hit) + " " + five_digits(shapes[k].hit * tilt);
+            five_digits(1e-3 * hertz * t60_s) + "*damp)]";
+    for (const double factor : {1.0 / tilt, 1.0, tilt}) {
+      text += is_one ? " " + five_digits(shapes[k].hit * factor) : "";
+    }
+    for (std::size_t r = 0; r < gains.size(); ++r) {
+      // Blows of several strengths at one place move a mode in the same direction.
+      const double hit = gets_louder(found) ? std::fabs(hit_of(found, r, k)) : hit_of(found, r, k);
+      text += " " + five_digits(gains[r] * shapes[k].hit * hit);
+    }
     for (std::size_t c = 0; c < channels; ++c) {
       text += " " + five_digits(shapes[k].position[c]) + " " + five_digits(shapes[k].velocity[c]);
     }
@@ -261,11 +299,16 @@ std::string played_preset(const Identification& found, const std::vector<NoiseBa
       peak = std::max(peak, std::fabs(x));
     }
   }
-  const std::size_t places = 3 + 2 * found.sound.size();
+  const std::size_t struck = found.hits.empty() ? 3 : found.hits.size();
+  const std::size_t places = struck + 2 * found.sound.size();
   const double cents =
       1200.0 * std::log2(loudest_hz(found) / found.modes.front().frequency_hz.value);
   const double semitones = std::round(cents / 100.0);
-  const std::string range = "[0, " + place_of(places, 2) + "]";
+  const std::string last = place_of(places, struck - 1);
+  // Recorded blows of several strengths have their own contact times, so no mallet changes them.
+  const bool has_mallet = !gets_louder(found);
+  const std::string longest_ms = has_mallet ? "4.0" : "0.05";
+  const std::string range = "[0, " + last + "]";
   std::string text =
       "model = \"" + model + "\"\ndescription = \"" + source + ": " +
       counted(found.modes.size(), "mode", "modes") +
@@ -273,10 +316,14 @@ std::string played_preset(const Identification& found, const std::vector<NoiseBa
       "\nflattening_cents = " + five_digits(100.0 * semitones - cents) +
       "\ngain = " + five_digits(wanted_peak / peak) +
       (noise.empty() ? std::string() : "\nfixed = [\"" + noise_label(label) + "\"]") +
-      "\nhardness = \"mallet\"\n\n[parameters]\nmallet = { value = 0, range = [-0.5, 0.5] }\nring "
-      "= { value = 1, range = [0.5, 2] }\n"
+      (has_mallet ? "\nhardness = \"mallet\"\n\n[parameters]\nmallet = { value = 0, range = [-0.5, "
+                    "0.5] }"
+                  : "\n\n[parameters]") +
+      "\nring = { value = 1, range = [0.5, 2] }\n"
       "damp = { value = 0, range = [0, 20] }\nplace = { value = " +
-      place_of(places, 1) + ", range = " + range + " }\n" + strike(1.0, 1) + strike(-1.0, 2);
+      place_of(places, found.hits.empty() ? 1 : 0) + ", range = " + range +
+      (has_mallet ? "" : ", velocity = [[0, 0], [127, " + last + "]]") + " }\n" +
+      strike(1.0, 1, longest_ms) + strike(-1.0, 2, longest_ms);
   for (std::size_t b = 0; b < noise.size(); ++b) {
     const std::string ms = five_digits(std::clamp(1e3 * noise[b].t60_s, 1.0, 10000.0));
     text += "\n[[control]]\nfrom = \"note\"\nto = \"in" + std::to_string(b + 2) +
@@ -284,17 +331,15 @@ std::string played_preset(const Identification& found, const std::vector<NoiseBa
             ms + ", " + ms + "]\nband_hz = [" + five_digits(noise[b].low_hz) + ", " +
             five_digits(noise[b].high_hz) + "]\n";
   }
-  // A longer time constant than 100 s is no fall.
-  if (const double decays_per_s = 1.0 / found.fall.decay_s.value;
-      found.fall.cents.value > 0.0 && decays_per_s >= 0.01) {
+  if (found.fall.cents.value > 0.0) {
     const std::string cents = five_digits(found.fall.cents.value);
     text += "\n[[lfo]]\nname = \"tension\"\nshape = \"fall\"\nrate_hz = " +
-            five_digits(std::min(50.0, decays_per_s)) +
+            five_digits(std::clamp(1.0 / found.fall.decay_s.value, 0.01, 50.0)) +
             "\nby = \"level\"\n\n[[control]]\nfrom = \"tension\"\nto = \"pitch\"\nrange = [-" +
             cents + ", " + cents + "]\n";
   }
   return text + knob("cc1", "place", "Place", range) +
-         knob("cc16", "mallet", "Mallet", "[-0.5, 0.5]") +
+         (has_mallet ? knob("cc16", "mallet", "Mallet", "[-0.5, 0.5]") : "") +
          knob("cc71", "ring", "Ring", "[0.5, 2]\ncurve = \"exponential\"") +
          knob("cc74", "damp", "Brightness", "[20, 0]");
 }

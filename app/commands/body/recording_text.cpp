@@ -83,7 +83,8 @@ std::string header(const Identification& found, const std::string& source) {
     text += "# Warning: " + one_line(warning) + ".\n";
   }
   text +=
-      "# A force of 1 at hit, for one sample, makes the amplitudes of the recording" +
+      "# A force of 1 at " + joined(struck_places(found), ", ") +
+      ", for one sample, makes the amplitudes of the recording" +
       std::string(channels == 1 ? " at mic" : "") +
       ".\n# Comments of the modes: standard deviations of Hz and T60, the level and its standard\n"
       "# deviation.\n";
@@ -91,6 +92,18 @@ std::string header(const Identification& found, const std::string& source) {
 }
 
 }  // namespace
+
+std::vector<std::string> struck_places(const Identification& found) {
+  std::vector<std::string> names;
+  for (std::size_t r = 0; r < found.hits.size(); ++r) {
+    names.push_back("hit" + std::to_string(r + 1));
+  }
+  return names.empty() ? std::vector<std::string>{"hit"} : names;
+}
+
+double hit_of(const Identification& found, std::size_t recording, std::size_t mode) {
+  return found.hits.empty() ? 1.0 : found.hits[recording][mode];
+}
 
 std::string choices_of(const Identification& found, const std::string& before,
                        const std::string& after) {
@@ -119,8 +132,9 @@ std::string body_model(const Identification& found, const std::string& label,
                        const std::string& source, double mass) {
   const std::vector<std::string> places = places_of(found.sound.size());
   const std::vector<BodyShape> shapes = body_shapes(found.modes, mass);
-  std::string text = header(found, source) + "@" + label + " body " + print_number(mass) + " hit " +
-                     joined(places, " ") + "\n";
+  const std::vector<std::string> hits = struck_places(found);
+  std::string text = header(found, source) + "@" + label + " body " + print_number(mass) + " " +
+                     joined(hits, " ") + " " + joined(places, " ") + "\n";
   for (std::size_t k = 0; k < found.modes.size(); ++k) {
     const IdentifiedMode& mode = found.modes[k];
     double square = 0.0;
@@ -134,7 +148,10 @@ std::string body_model(const Identification& found, const std::string& label,
     text += "@" + label + "_" + std::to_string(k + 1) + " mode @" + label + " " +
             known_digits(mode.frequency_hz.value, mode.frequency_hz.deviation) + " " +
             known_digits(mode.t60_s.value, mode.t60_s.deviation) + " " +
-            known_digits(shapes[k].hit, 0.5 * share * shapes[k].hit);
+            known_digits(shapes[k].hit * hit_of(found, 0, k), 0.5 * share * shapes[k].hit);
+    for (std::size_t r = 1; r < hits.size(); ++r) {
+      text += " " + known_digits(shapes[k].hit * hit_of(found, r, k), share * shapes[k].hit);
+    }
     for (const double heard : shapes[k].heard) {
       text += " " + known_digits(heard, share * std::fabs(shapes[k].hit));
     }
@@ -143,7 +160,9 @@ std::string body_model(const Identification& found, const std::string& label,
             formatted("%.1f", decibels(size)) + " dB +-" +
             formatted("%.1g", decibels(1.0 + share)) + "\n";
   }
-  text += "@in1 frcInput [@" + label + " hit]\n";
+  for (std::size_t r = 0; r < hits.size(); ++r) {
+    text += "@in" + std::to_string(r + 1) + " frcInput [@" + label + " " + hits[r] + "]\n";
+  }
   for (std::size_t c = 0; c < places.size(); ++c) {
     text += "@out" + std::to_string(c + 1) + " posOutput [@" + label + " " + places[c] + "]\n";
   }

@@ -47,7 +47,8 @@ Result<Description> describe_file(const std::string& path, const DescribeOptions
     return description;
   }
   const Progress should_continue([&](std::string_view) { return progress(1.0); });
-  const auto found = identify_recording(path, {.most_modes = options.modes}, should_continue);
+  const auto found =
+      identify_recordings(std::span(&path, 1), {.most_modes = options.modes}, should_continue);
   if (!found) {
     const std::string why = renamed(found.error().message, path, options.name);
     std::fprintf(stderr, "%s: no modes\n", why.c_str());

@@ -56,7 +56,7 @@ Result<SoundTargets> targets_like(const std::string& path, const Progress& progr
     like.targets.push_back(
         {TargetFigure::attack, 1e3 * std::pow(10.0, sound->temporal->log_attack_time)});
   }
-  const auto found = identify_recording(path, {.most_modes = 40}, progress);
+  const auto found = identify_recordings(std::span(&path, 1), {.most_modes = 40}, progress);
   if (!found) {
     std::fprintf(stderr, "%s: no modes, so T60 is not a target\n", found.error().message.c_str());
     return like;

@@ -214,6 +214,37 @@ TEST_CASE("A played recording has its loudest mode at the key, and no key is lou
   CHECK(power.between(0.98 * omega, 1.02 * omega) > 0.5 * power.between(0.0, 1.2 * omega));
 }
 
+TEST_CASE("Recordings from soft to loud are the timbres of low and high velocities",
+          "[recording_text]") {
+  Identification found =
+      identified({ringing({{220.0, 0.5, 0.5, -1.5}, {550.0, 0.4, 0.4, -1.5}}, 1.0)});
+  // The soft blow moves the second mode a tenth as much, relative to the first one.
+  found.hits = {{0.1, 0.01}, {1.0, 1.0}};
+  const auto folder = TemporaryFolder::make();
+  REQUIRE(folder);
+  std::ofstream(folder->file("bowl.mdl")) << played_model(found, {}, "bowl", "bowl.wav", 40.0);
+  std::ofstream(folder->file("bowl.toml"))
+      << played_preset(found, {}, "bowl", "bowl.mdl", "bowl.wav");
+  const auto scene = load_scene(folder->file("bowl.toml"), {});
+  REQUIRE(scene);
+  // Returns the power of the second mode relative to that of the first one, in dB.
+  const auto brightness = [&](double velocity) {
+    std::vector<std::string> warnings;
+    auto compiled = compile_scene(*scene, {.rate_hz = 44100.0}, warnings);
+    REQUIRE(compiled);
+    Player player(*std::move(compiled));
+    Event note = note_on(0, 57);
+    note.value = velocity;
+    player.run(44100, {note});
+    const std::vector<double> y = player.y();
+    const Power power(std::vector<std::vector<double>>{y}, y.size());
+    const double hertz = 2.0 * std::numbers::pi / 44100.0;
+    return 10.0 * std::log10(power.between(540.0 * hertz, 560.0 * hertz) /
+                             power.between(210.0 * hertz, 230.0 * hertz));
+  };
+  CHECK(brightness(1.0) - brightness(0.001) == Approx(20.0).margin(0.5));
+}
+
 TEST_CASE("Numbers are written with their significant digits", "[recording_text]") {
   Random random(2);
   const Identification found = identified({with_noise(ringing(known, 1.0), 1e-3, random)});

@@ -615,6 +615,32 @@ TEST_CASE("The residual of fewer modes is reported, and missing modes give a war
   CHECK(five.residual_db == Approx(found.choices[0].residual_db).margin(0.5));
 }
 
+TEST_CASE("Recordings of one object share its modes and differ in how they move", "[identify]") {
+  // A loud blow, a soft one that moves the second mode less, and one beyond its node.
+  const std::vector<double> first = {1.0, 0.1, 0.3};
+  const std::vector<double> second = {0.5, 0.02, -0.4};
+  std::vector<Recording> recordings;
+  Random random(96);
+  for (std::size_t r = 0; r < first.size(); ++r) {
+    const std::vector<double> sound = ringing({{200.0, 0.8, first[r], -0.5 * std::numbers::pi},
+                                               {330.0, 0.5, second[r], -0.5 * std::numbers::pi}},
+                                              1.0 + 0.1 * static_cast<double>(r));
+    recordings.push_back({.channels = {with_noise(sound, 1e-5, random)}});
+  }
+  const auto found = identify_together(recordings, {}, Progress());
+  REQUIRE(found);
+  REQUIRE(found->modes.size() == 2);
+  REQUIRE(found->hits.size() == 3);
+  CHECK(found->sound.size() == 1);
+  CHECK(found->modes[0].frequency_hz.value == Approx(200.0).margin(0.001));
+  CHECK(found->modes[0].t60_s.value == Approx(0.8).epsilon(0.001));
+  CHECK(found->modes[0].amplitude.size() == 1);
+  for (std::size_t r = 0; r < first.size(); ++r) {
+    CHECK(found->hits[r][0] == Approx(first[r] / first[0]).margin(0.001));
+    CHECK(found->hits[r][1] == Approx(second[r] / second[0]).margin(0.001));
+  }
+}
+
 TEST_CASE("Unusable recordings are rejected with the reason", "[identify]") {
   CHECK(refusal({}) == "the recording has no samples");
   CHECK(refusal({{}}) == "the recording has no samples");
