@@ -21,6 +21,7 @@ struct GestureSettings {
   double low_db = 0.0;
   double high_db = 0.0;
   // Impulse, swing: duration of the softest and the hardest pulse, 0 is one sample. Noise: T60.
+  // Bow: time in which the level rises.
   double longest_s = 0.0;
   double shortest_s = 0.0;
   bool follows_pitch = true;  // speeds, forces and durations scale with the key's pitch

@@ -164,7 +164,8 @@ void Gestures::play(const GestureRow& gesture, std::size_t input, Stroke stroke,
     driver(*latest, input).wait_for_motion(stroke.string_hz / machine_.rate_hz);
   }
   if (stroke.settings.has_level && stroke.amount != 0.0) {
-    keyboard.set_strength(voice, stroke.level() / stroke.share);
+    const double rise_s = gesture.gesture == Gesture::bow ? stroke.length_s() : 0.0;
+    keyboard.set_strength(voice, stroke.level() / stroke.share, rise_s);
   }
   if (stroke.rest) {
     set_starts(scope.channels, input, *stroke.rest);

@@ -367,7 +367,7 @@ void Keyboard::vibrate(Voice& voice, double semitones, double gain) {
   }
   if (voice.tremolo != gain) {
     voice.tremolo = gain;
-    if (voice.is_new) {
+    if (voice.is_new && voice.volume_frames == 0) {
       set_strength(voice, voice.strength);
     } else {
       voices.follow_volume(voice, level_of(voice));
@@ -375,10 +375,13 @@ void Keyboard::vibrate(Voice& voice, double semitones, double gain) {
   }
 }
 
-void Keyboard::set_strength(Voice& voice, double strength) const {
+void Keyboard::set_strength(Voice& voice, double strength, double rise_s) const {
   voice.strength = strength;
   const SideGains level = level_of(voice);
-  if (voice.is_new) {
+  if (voice.is_new && rise_s > 0.0) {
+    voice.volume = {0.0, 0.0};
+    voices.ramp_volume(voice, level, rise_s);
+  } else if (voice.is_new) {
     voice.volume = {strength * level[0], strength * level[1]};
     voice.volume_frames = 0;
   } else {

@@ -110,8 +110,8 @@ class Keyboard {
   void set_velocity(Voice& voice, double velocity);
   // Sets the pitch and the gain that LFOs add to a voice.
   void vibrate(Voice& voice, double semitones, double gain);
-  // Sets a voice's gain by velocity: at once if it starts, else within 20 ms.
-  void set_strength(Voice& voice, double strength) const;
+  // Sets a voice's gain by velocity: from 0 within `rise_s` if it starts, else within 20 ms.
+  void set_strength(Voice& voice, double strength, double rise_s = 0.0) const;
   // Ramps the voice's output to its negative.
   void invert(Voice& voice) const;
 

@@ -486,8 +486,10 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
                     is_noise ? "a key lies between 0 and 127, its lengths between 0 and 10000 ms"
                              : "a key lies between 0 and 127, its lengths between 0 and 1000 ms"},
                    control.length_keys, control.longest_ms, control.shortest_ms) &&
-      control.gesture != Gesture::impulse && control.gesture != Gesture::swing && !is_noise) {
-    reader.fail(*table.get("length_ms"), "'length_ms' is for impulses, swings and noise only");
+      control.gesture != Gesture::impulse && control.gesture != Gesture::swing && !is_noise &&
+      !(control.gesture == Gesture::bow && control.has_level)) {
+    reader.fail(*table.get("length_ms"),
+                "'length_ms' is for impulses, swings, noise, and bows with 'level_db' only");
   }
   const bool has_lengths = control.longest_ms > 0.0 && control.shortest_ms > 0.0 &&
                            std::ranges::all_of(control.length_keys, [](const KeyPair& point) {

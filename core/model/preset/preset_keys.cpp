@@ -50,7 +50,7 @@ constexpr PresetKey keys[] = {
     {"control", "curve", "`linear` or `exponential` (`linear`)", "`exponential`: equal steps are equal ratios"},
     {"control", "travel", "above 0", "for a pluck, which requires it: distance of the finger from the string on either side; also by key"},
     {"control", "level_db", "[low, high]", "gain of the softest and the loudest, added to `gain`, also by key. It does not change the gesture, except that it scales the force of an `impulse` with `tuning = \"fixed\"`. Without it `range` determines the level"},
-    {"control", "length_ms", "[longest, shortest] (one sample)", "for an impulse or a swing: duration of the softest and the hardest blow at the model's own pitch. For noise, which requires it: T60 of the softest and the hardest burst. Also by key"},
+    {"control", "length_ms", "[longest, shortest] (one sample)", "for an impulse or a swing: duration of the softest and the hardest blow at the model's own pitch. For noise, which requires it: T60 of the softest and the hardest burst. For a bow with `level_db`: time in which the level of the softest and the loudest stroke rises. Also by key"},
     {"control", "follows_pitch", "true or false (true)", "for a pluck, a bow, an impulse or a swing: whether durations, speeds and forces scale with the key's pitch, so that all keys have the same timbre"},
     {"control", "band_hz", "[low, high] ([20, 20000])", "for noise, and for a bow with `noise`: -3 dB points of a one-pole highpass and a one-pole lowpass, the same on every key"},
     {"control", "noise", "0 to 1 (0)", "for a bow: rms noise of its speed, as a share of the speed"},

@@ -198,6 +198,32 @@ TEST_CASE("a bowed note draws until its key is released", "[gesture]") {
   CHECK(player.out[0][19999] == player.out[0][19998]);
 }
 
+TEST_CASE("the level of a bow's stroke rises in a straight line within its length", "[gesture]") {
+  // The output is the bow's position, which is 0 without a stroke.
+  const std::string bow = "@in1 posInput 0." + puppet.substr(puppet.find("\n"));
+  const auto drawn = [&](double longest_ms, double shortest_ms) {
+    Preset preset = played({.target = "in1",
+                            .gesture = Gesture::bow,
+                            .low = 1e-4,
+                            .high = 1e-4,
+                            .has_level = true,
+                            .low_db = 0.0,
+                            .high_db = 0.0,
+                            .longest_ms = longest_ms,
+                            .shortest_ms = shortest_ms});
+    preset.keyboard = true;
+    Player player(bow, preset);
+    player.run(10000, {note_on(0, 60, 0.5)});
+    return player.out[0];
+  };
+  const std::vector<double> at_once = drawn(0.0, 0.0);
+  const std::vector<double> rising = drawn(200.0, 50.0);  // 100 ms at half the velocity
+  for (std::size_t n = 0; n < 10000; ++n) {
+    const double level = std::min(1.0, static_cast<double>(n) / 4410.0);
+    REQUIRE(std::fabs(rising[n] - level * at_once[n]) <= std::fabs(at_once[n]) / 4410.0 + 1e-13);
+  }
+}
+
 TEST_CASE("a bent or gliding bow keeps its speed in units of the string's motion", "[gesture]") {
   // The motion is slow against the rate: a key's frequency is proportional to sqrt(K), except for
   // w^2 / 24, which is at most 3e-4.

@@ -374,6 +374,8 @@ TEST_CASE("errors in presets have a line and a column", "[preset]") {
        "'keys' must lie between 0 and 127"},
       {with_control(to + "from = \"note\"\nhow = \"noise\""), 2, 1,
        "noise needs 'length_ms' above 0"},
+      {with_control(to + "from = \"note\"\nhow = \"bow\"\nlength_ms = [60, 40]"), 6, 13,
+       "'length_ms' is for impulses, swings, noise, and bows with 'level_db' only"},
       {with_control(to + "from = \"note\"\nband_hz = [20, 30]"), 5, 11, "'band_hz' is for noise"},
       {with_control(to + "from = \"note\"\nnoise = 0.1"), 5, 9, "'noise' is the noise of a bow"},
       {with_control(to + "from = \"release\"\nhow = \"impulse\"\nlevel_db = [-20, 0]"), 6, 12,
