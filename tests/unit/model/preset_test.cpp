@@ -194,12 +194,15 @@ TEST_CASE("noise, releases, LFOs and variation are read", "[preset]") {
   CHECK(control_of("from = \"note\"\nto = \"in1\"\nhow = \"bow\"\nnoise = 0.05").noise == 0.05);
   const auto read = parse_preset(
       "model = \"x.mdl\"\nvariation = { strength = 0.05, timing_ms = 5 }\n"
-      "[[lfo]]\nname = \"slow\"\n[[lfo]]\nname = \"vibrato\"\nrate_hz = 6\ndelay_s = 0.2\n"
+      "[[lfo]]\nname = \"slow\"\nshape = \"fall\"\nby = \"level\"\n[[lfo]]\nname = "
+      "\"vibrato\"\nrate_hz = 6\ndelay_s = 0.2\n"
       "fade_s = 0.4\nshape = \"random\"\ndepth = 0.5\ndeviation = 0.1\nby = \"cc1\"\n"
       "[[control]]\nfrom = \"vibrato\"\nto = \"pitch\"\nrange = [-10, 10]\n");
   REQUIRE(read.ok());
   CHECK(read.preset.varied_strength == 0.05);
   CHECK(read.preset.varied_ms == 5.0);
+  CHECK(read.preset.lfos[0] ==
+        LfoSetting{.name = "slow", .lfo = {.shape = LfoShape::fall}, .by = ControlSource::note});
   CHECK(read.preset.lfos[1] == LfoSetting{.name = "vibrato",
                                           .lfo = {.rate_hz = 6.0,
                                                   .delay_s = 0.2,
@@ -386,7 +389,8 @@ TEST_CASE("errors in presets have a line and a column", "[preset]") {
       {m + "[[lfo]]\nrate_hz = 5", 2, 1, "an LFO needs a name of its own"},
       {m + "[[lfo]]\nname = \"cc1\"", 3, 8, "an LFO needs a name of its own"},
       {m + "[[lfo]]\nname = \"v\"\nshape = \"saw\"", 4, 9, "'shape' must be sine, triangle"},
-      {m + "[[lfo]]\nname = \"v\"\nby = \"note\"", 4, 6, "'by' must be \"pressure\", or"},
+      {m + "[[lfo]]\nname = \"v\"\nby = \"note\"", 4, 6,
+       "'by' must be \"level\", \"pressure\", or"},
       {m + "[[lfo]]\nname = \"v\"\n[[control]]\nfrom = \"v\"\nto = \"in1\"\nrange = [0, 1]", 4, 1,
        "an LFO moves \"pitch\" (in cents), \"level\" (in dB) or a parameter"},
       {m + "[[lfo]]\nname = \"v\"\n[[control]]\nfrom = \"v\"\nto = \"pitch\"", 4, 1,
