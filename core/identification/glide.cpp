@@ -20,10 +20,12 @@ constexpr double lowest_tone_hz = 30.0;
 constexpr std::size_t most_modes = 5;
 constexpr double most_size = 0.26;         // 450 cents
 constexpr double most_correlation = 0.98;  // of the errors of size and decay
+// A glide counts if it leaves less than this share of what as many modes alone leave.
+constexpr double much_less = 0.8;
+// A number of modes is enough if it leaves at most this ratio of the least, and this share of all.
 constexpr double about = 1.25;
-constexpr double negligible = 1e-3;  // share of the sound's energy
-constexpr double much_less = 0.8;    // Share of the residual below which a glide counts.
-constexpr double certain = 3.0;      // Number of standard deviations from 0 at which it counts.
+constexpr double negligible = 1e-3;
+constexpr double certain = 3.0;  // number of standard deviations between the size and 0
 
 // A sinc with a Hann window, at `parts` places between two samples.
 class Interpolation {

@@ -36,8 +36,9 @@ struct FoundGlide {
   Glide steps[2];
 };
 
-// Fits the glide that helps one to five modes the most to explain the sound. Returns a glide of
-// size 0 if no glide leaves a fifth less to five modes than constant frequencies do.
+// Fits a glide together with one to five modes below 1 kHz. Returns a glide of size 0 if modes of
+// constant frequency have a lower Bayesian information criterion, or if the size is less than three
+// standard deviations.
 FoundGlide find_glide(const Channels& sound, double rate_hz, const Progress& progress);
 
 // Returns the sound without its glide, in which the loudest mode decays at the same rate.

@@ -24,6 +24,33 @@ namespace {
 const std::vector<KnownMode> known = {
     {220.0, 1.0, 0.5, -1.5707963}, {223.0, 0.9, 0.3, 1.5707963}, {910.0, 0.4, 0.2, -1.5707963}};
 
+// Plays the preset of a recording.
+class PlayedRecording {
+ public:
+  PlayedRecording(const Identification& found, const std::vector<NoiseBand>& noise)
+      : folder_(TemporaryFolder::make()) {
+    REQUIRE(folder_);
+    std::ofstream(folder_->file("bowl.mdl"))
+        << played_model(found, noise, "bowl", "bowl.wav", 40.0);
+    std::ofstream(folder_->file("bowl.toml"))
+        << played_preset(found, noise, "bowl", "bowl.mdl", "bowl.wav");
+  }
+  // Returns the first second of a note.
+  std::vector<double> note(int key, double velocity = 1.0) const {
+    const auto scene = load_scene(folder_->file("bowl.toml"), {});
+    REQUIRE(scene);
+    std::vector<std::string> warnings;
+    auto compiled = compile_scene(*scene, {.rate_hz = 44100.0}, warnings);
+    REQUIRE(compiled);
+    Player player(*std::move(compiled));
+    player.run(44100, {note_on(0, key, velocity)});
+    return player.y();
+  }
+
+ private:
+  decltype(TemporaryFolder::make()) folder_;
+};
+
 }  // namespace
 
 TEST_CASE("A label is made from a file name", "[recording_text]") {
@@ -135,23 +162,10 @@ TEST_CASE("The preset of a recording plays the fall of its pitch on all keys", "
   found.fall = {.cents = {300.0, 1.0}, .decay_s = {0.1, 0.001}};
   const std::vector<NoiseBand> noise = {
       {.low_hz = 14000.0, .high_hz = 20000.0, .t60_s = 0.02, .level = {1e-4}}};
-  const auto folder = TemporaryFolder::make();
-  REQUIRE(folder);
-  std::ofstream(folder->file("bowl.mdl")) << played_model(found, noise, "bowl", "bowl.wav", 40.0);
-  std::ofstream(folder->file("bowl.toml"))
-      << played_preset(found, noise, "bowl", "bowl.mdl", "bowl.wav");
-  const auto scene = load_scene(folder->file("bowl.toml"), {});
-  REQUIRE(scene);
+  const PlayedRecording body(found, noise);
   for (const int key : {57, 93}) {  // A3 and A6
     INFO("key " << key);
-    std::vector<std::string> warnings;
-    auto compiled = compile_scene(*scene, {.rate_hz = 44100.0}, warnings);
-    REQUIRE(compiled);
-    Player player(*std::move(compiled));
-    Event loudest = note_on(0, key);
-    loudest.value = 1.0;
-    player.run(44100, {loudest});
-    std::vector<double> y = player.y();
+    const std::vector<double> y = body.note(key, 1.0);
     REQUIRE(peak(y) > 0.01);
     // Upward zero crossings in 50 ms: the mean of 300 cents e^(-t / 0.1 s) over this time.
     const auto cents_at = [&](double time_s) {
@@ -183,23 +197,8 @@ TEST_CASE("A played recording has its loudest mode at the key, and no key is lou
                                                     {220.0, 0.5, 0.5, 0.0},
                                                     {330.0, 0.4, 0.4, std::numbers::pi}},
                                                    1.0)});
-  const std::string text = played_preset(found, {}, "bowl", "bowl.mdl", "bowl.wav");
-  INFO(text);
-  const auto folder = TemporaryFolder::make();
-  REQUIRE(folder);
-  std::ofstream(folder->file("bowl.mdl")) << played_model(found, {}, "bowl", "bowl.wav", 40.0);
-  std::ofstream(folder->file("bowl.toml")) << text;
-  const auto scene = load_scene(folder->file("bowl.toml"), {});
-  REQUIRE(scene);
-  const auto played = [&](int key) {
-    std::vector<std::string> warnings;
-    auto compiled = compile_scene(*scene, {.rate_hz = 44100.0}, warnings);
-    REQUIRE(compiled);
-    Player player(*std::move(compiled));
-    player.run(44100, {note_on(0, key)});
-    return player.y();
-  };
-  const auto peak_at = [&](int key) { return peak(played(key)); };
+  const PlayedRecording body(found, {});
+  const auto peak_at = [&](int key) { return peak(body.note(key)); };
   const double own = peak_at(57);
   CHECK(own > 0.1);
   // Velocities alone have at most the sum of the amplitudes, 1.0 beside a peak of 0.8 or more.
@@ -207,7 +206,7 @@ TEST_CASE("A played recording has its loudest mode at the key, and no key is lou
     INFO("key " << key);
     CHECK(peak_at(key) < 1.3 * own);
   }
-  const std::vector<double> y = played(57);
+  const std::vector<double> y = body.note(57);
   const Power power(std::vector<std::vector<double>>{y}, y.size());
   // A mode with a T60 of 0.5 s has 2 / pi atan(2), 70 %, of its energy within 4.4 Hz.
   const double omega = 2.0 * std::numbers::pi * 220.0 / 44100.0;
@@ -220,23 +219,10 @@ TEST_CASE("Recordings from soft to loud are the timbres of low and high velociti
       identified({ringing({{220.0, 0.5, 0.5, -1.5}, {550.0, 0.4, 0.4, -1.5}}, 1.0)});
   // The soft blow moves the second mode a tenth as much, relative to the first one.
   found.hits = {{0.1, 0.01}, {1.0, 1.0}};
-  const auto folder = TemporaryFolder::make();
-  REQUIRE(folder);
-  std::ofstream(folder->file("bowl.mdl")) << played_model(found, {}, "bowl", "bowl.wav", 40.0);
-  std::ofstream(folder->file("bowl.toml"))
-      << played_preset(found, {}, "bowl", "bowl.mdl", "bowl.wav");
-  const auto scene = load_scene(folder->file("bowl.toml"), {});
-  REQUIRE(scene);
+  const PlayedRecording body(found, {});
   // Returns the power of the second mode relative to that of the first one, in dB.
   const auto brightness = [&](double velocity) {
-    std::vector<std::string> warnings;
-    auto compiled = compile_scene(*scene, {.rate_hz = 44100.0}, warnings);
-    REQUIRE(compiled);
-    Player player(*std::move(compiled));
-    Event note = note_on(0, 57);
-    note.value = velocity;
-    player.run(44100, {note});
-    const std::vector<double> y = player.y();
+    const std::vector<double> y = body.note(57, velocity);
     const Power power(std::vector<std::vector<double>>{y}, y.size());
     const double hertz = 2.0 * std::numbers::pi / 44100.0;
     return 10.0 * std::log10(power.between(540.0 * hertz, 560.0 * hertz) /
