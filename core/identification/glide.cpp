@@ -31,11 +31,13 @@ constexpr double certain = 3.0;  // number of standard deviations between the si
 class Interpolation {
  public:
   Interpolation() {
-    for (std::size_t i = 0; i < taps * (parts + 1); ++i) {
-      const double away = static_cast<double>(i / taps) / parts - tap(i % taps);
-      const double turn = std::numbers::pi * away;
-      const double window = std::cos(turn / taps);
-      table_[i] = away == 0.0 ? 1.0 : window * window * std::sin(turn) / turn;
+    for (std::size_t row = 0; row <= parts; ++row) {
+      for (std::size_t k = 0; k < taps; ++k) {
+        const double away = static_cast<double>(row) / parts - tap(k);
+        const double turn = std::numbers::pi * away;
+        const double window = std::cos(turn / taps);
+        table_[row * taps + k] = away == 0.0 ? 1.0 : window * window * std::sin(turn) / turn;
+      }
     }
   }
   // Returns the sound between samples. It is 0 before its start and after its end.
