@@ -50,8 +50,7 @@ class LfoState {
   // at the depth and decreases by the factor e in each period.
   double value(const Lfo& lfo) {
     const double t = age_s_ - lfo.delay_s;
-    const bool starts_at_zero = lfo.shape != LfoShape::steps && lfo.shape != LfoShape::fall;
-    if (t < 0.0 || (t == 0.0 && starts_at_zero)) {
+    if (t < 0.0) {
       return 0.0;
     }
     const double turns = turns_at(t);

@@ -41,13 +41,17 @@ bool is_thrown(const Network& network, const Input& input) {
          });
 }
 
-// The setting must fit the network.
-Control make_control(const Network& network, const ControlSetting& setting) {
+Source source_of(ControlSource source) {
   static constexpr Source sources[] = {Source::note,   Source::controller, Source::pressure,
                                        Source::custom, Source::audio,      Source::release,
                                        Source::lfo};
+  return sources[static_cast<std::size_t>(source)];
+}
+
+// The setting must fit the network.
+Control make_control(const Network& network, const ControlSetting& setting) {
   Control control;
-  control.source = sources[static_cast<std::size_t>(setting.source)];
+  control.source = source_of(setting.source);
   control.gesture = setting.gesture;
   control.number = static_cast<std::uint16_t>(
       setting.source == ControlSource::audio ? setting.number - 1 : setting.number);
@@ -85,9 +89,7 @@ std::vector<PlayedLfo> make_lfos(const Preset& preset) {
   for (const LfoSetting& setting : preset.lfos) {
     lfos.push_back({.lfo = setting.lfo,
                     .is_scaled = setting.by.has_value(),
-                    .by = setting.by == ControlSource::controller ? Source::controller
-                          : setting.by == ControlSource::note     ? Source::note
-                                                                  : Source::pressure,
+                    .by = source_of(setting.by.value_or(ControlSource::pressure)),
                     .number = static_cast<std::uint16_t>(setting.number)});
   }
   return lfos;

@@ -100,8 +100,7 @@ void Lfos::apply(std::size_t lane, Keyboard& keyboard) {
       const std::size_t i = lane * count_ + control.number;
       const PlayedLfo& lfo = playing_.lfos[control.number];
       const double strength = keyboard.voices[lane].strength;
-      const double scale =
-          lfo.is_scaled && lfo.by == Source::note ? strength * strength : scales_[i];
+      const double scale = lfo.by == Source::note ? strength * strength : scales_[i];
       const double value = scale * states_[i].value(lfo.lfo);
       const GestureSettings& range = control.settings;
       const double wanted = range.low + (range.high - range.low) * (0.5 + 0.5 * value);

@@ -70,21 +70,18 @@ const Interpolation& interpolation() {
   return only;
 }
 
-// Returns a sound without glide with this glide.
-Channels with_glide(const Channels& sound, const Glide& glide) {
-  if (glide.size == 0.0) {
-    return sound;
-  }
-  Channels falling(sound.size());
-  for (double time = 0.0; glide.straight(time) < static_cast<double>(sound[0].size());
-       time += 1.0) {
-    const double phase = glide.straight(time);
-    const double gain = std::exp(glide.damping * (phase - time));
-    for (std::size_t c = 0; c < sound.size(); ++c) {
-      falling[c].push_back(gain * interpolation()(sound[c], phase));
+// Returns the times at which modes of constant frequency have the phases 0, 1, 2 and so on.
+std::vector<double> times_of(const Glide& glide, std::size_t frames) {
+  std::vector<double> times;
+  const double last = glide.straight(static_cast<double>(frames) - 1.0);
+  double time = 0.0;
+  for (double phase = 0.0; phase <= last; phase += 1.0) {
+    for (int step = 0; step < 3; ++step) {  // Newton's method from the previous sample's time
+      time += (phase - glide.straight(time)) / std::exp(glide.size * std::exp(-time / glide.decay));
     }
+    times.push_back(std::max(0.0, time));
   }
-  return falling;
+  return times;
 }
 
 // A low band of the sound, whose modes are fitted at several glides.
@@ -111,11 +108,11 @@ class GlideFit {
   // Chooses modes one after the other, those that explain the most. Returns the energy that each
   // number of them leaves, from one mode on.
   std::vector<double> choose(const Glide& glide, std::size_t count = most_modes) {
-    const Channels straight = without(glide);
+    const Straight straight = without(glide);
     std::vector<double> left;
     poles_.clear();
     while (left.size() < count) {
-      DampedFit fit(straight);
+      DampedFit fit(straight.sound);
       fit.limit(grid_.front().imag(), 0.0);
       fit.set_poles(poles_);
       std::vector<double> explained(grid_.size());
@@ -125,10 +122,10 @@ class GlideFit {
           explained[i] -= std::norm(moments[i].zeroth) * grid_[i].real();
         }
       }
-      progress_.spend(grid_.size() * straight[0].size() / 4);
+      progress_.spend(grid_.size() * straight.weights.size() / 4);
       const auto best = std::ranges::max_element(explained) - explained.begin();
       poles_.push_back(grid_[static_cast<std::size_t>(best)]);
-      left.push_back(refine(straight, glide, 6));
+      left.push_back(refine(straight, 6));
     }
     return left;
   }
@@ -137,41 +134,48 @@ class GlideFit {
   const std::vector<Complex>& poles() const { return poles_; }
   void set_poles(const std::vector<Complex>& poles) { poles_ = poles; }
   // Moves the chosen modes and returns the energy left.
-  double refine(const Glide& glide) { return refine(without(glide), glide, 30); }
+  double refine(const Glide& glide) { return refine(without(glide), 30); }
   double energy() const { return DampedFit(low_).rest_energy(); }
   double freedoms() const {
     return 2.0 * highest * static_cast<double>(low_.size() * low_[0].size());
   }
 
  private:
-  Glide at_low_rate(Glide glide) const {
+  struct Straight {
+    Channels sound;
+    std::vector<double> weights;  // of the samples' energies, as in the sound with its glide
+  };
+  Straight without(Glide glide) const {
     glide.decay /= static_cast<double>(step_);
     glide.damping *= static_cast<double>(step_);
-    return glide;
-  }
-
-  // The first samples of the band contain its filter's transient.
-  Channels without(const Glide& glide) const {
-    Channels straight = without_glide(low_, at_low_rate(glide));
-    for (std::vector<double>& channel : straight) {
+    Straight straight{without_glide(low_, glide), {}};
+    for (const double time : times_of(glide, low_[0].size())) {
+      const auto phase = static_cast<double>(straight.weights.size());
+      straight.weights.push_back(std::exp(2.0 * glide.damping * (phase - time) -
+                                          glide.size * std::exp(-time / glide.decay)));
+    }
+    // The first samples contain the transient of the band's filter.
+    straight.weights.erase(straight.weights.begin(), straight.weights.begin() + left_out);
+    for (std::vector<double>& channel : straight.sound) {
       channel.erase(channel.begin(), channel.begin() + left_out);
     }
     return straight;
   }
-  double refine(const Channels& straight, const Glide& glide, int steps) {
-    DampedFit fit(straight);
+  double refine(const Straight& straight, int steps) {
+    DampedFit fit(straight.sound);
     fit.limit(grid_.front().imag(), 0.0);
     if (!fit.set_poles(poles_)) {
       return HUGE_VAL;
     }
     fit.refine(steps, 1e-7, progress_);
     poles_ = poles_of(fit.modes());
-    // The energy in time, because a glide changes that of the noise.
-    Channels rest = fit.rest();
-    for (std::vector<double>& channel : rest) {
-      channel.insert(channel.begin(), left_out, 0.0);
+    double left = 0.0;
+    for (const std::vector<double>& channel : fit.rest()) {
+      for (std::size_t n = 0; n < channel.size(); ++n) {
+        left += straight.weights[n] * channel[n] * channel[n];
+      }
     }
-    return DampedFit(with_glide(rest, at_low_rate(glide))).rest_energy();
+    return left;
   }
 
   static constexpr int left_out = 16;
@@ -191,11 +195,15 @@ Glide moved(const Glide& glide, double size, double log_decay) {
 // logarithm of the decay.
 struct Neighbours {
   Neighbours(GlideFit& fit, const Glide& glide)
-      : size_step(std::max(0.002, 0.1 * glide.size)), left(fit.refine(glide)) {
+      : size_step(std::max(0.002, 0.1 * glide.size)), left(fit.refine(glide)), lowest_left(left) {
     const std::vector<Complex> poles = fit.poles();
     const auto left_at = [&](double size, double log_decay) {
       fit.set_poles(poles);
-      return fit.refine(moved(glide, size, log_decay));
+      const Glide there = moved(glide, size, log_decay);
+      const double energy = fit.refine(there);
+      lowest = energy < lowest_left ? there : lowest;
+      lowest_left = std::min(lowest_left, energy);
+      return energy;
     };
     larger = left_at(size_step, 0.0);
     smaller = left_at(-size_step, 0.0);
@@ -217,6 +225,8 @@ struct Neighbours {
   static constexpr double decay_step = 0.1;
   double size_step;
   double left;
+  Glide lowest;  // the neighbour that leaves the least, if that is less than `left`
+  double lowest_left;
   double larger, smaller;
   double slower, faster;
   double both, neither;
@@ -229,13 +239,13 @@ struct TriedGlide {
 };
 
 // Finds the nearest glide that leaves the least to the chosen modes, by Newton's method with
-// damping.
+// damping, or from neighbour to neighbour.
 TriedGlide descended(GlideFit& fit, const Glide& start) {
   TriedGlide best{start, fit.refine(start)};
   best.glide.damping = fit.damping();
   best.left = fit.refine(best.glide);
   double damping = 0.1;
-  for (int step = 0; step < 12 && damping < 1e3; ++step) {
+  for (int step = 0; step < 20 && damping < 1e3; ++step) {
     const std::vector<Complex> poles = fit.poles();
     const Neighbours near(fit, best.glide);
     const double h = near.size_step;
@@ -248,12 +258,17 @@ TriedGlide descended(GlideFit& fit, const Glide& start) {
         std::fabs(near.slower + near.faster - 2.0 * near.left) / (g * g) * (1.0 + damping);
     const double b = near.mixed(a, d);
     const double determinant = a * d - b * b;
-    Glide next;
-    if (determinant > 0.0) {
-      next = moved(best.glide, -(d * size_slope - b * decay_slope) / determinant,
-                   std::clamp(-(a * decay_slope - b * size_slope) / determinant, -1.0, 1.0));
+    Glide next = moved(best.glide, -(d * size_slope - b * decay_slope) / determinant,
+                       std::clamp(-(a * decay_slope - b * size_slope) / determinant, -1.0, 1.0));
+    const auto left_at = [&](const Glide& glide) {
+      fit.set_poles(poles);
+      return glide.size > 0.0 && glide.size < most_size ? fit.refine(glide) : HUGE_VAL;
+    };
+    double left = left_at(next);
+    if (!(left < best.left)) {
+      next = near.lowest;
+      left = left_at(next);
     }
-    const double left = next.size > 0.0 && next.size < most_size ? fit.refine(next) : HUGE_VAL;
     if (!(left < best.left)) {
       fit.set_poles(poles);
       damping = 10.0 * damping + 0.1;
@@ -299,16 +314,13 @@ Channels without_glide(const Channels& sound, const Glide& glide) {
   if (glide.size == 0.0) {
     return sound;
   }
-  Channels straight(sound.size());
-  const auto last = static_cast<double>(sound[0].size() - 1);
-  double time = 0.0;
-  for (double phase = 0.0; phase <= glide.straight(last); phase += 1.0) {
-    for (int step = 0; step < 3; ++step) {  // Newton's method from the previous sample's time
-      time += (phase - glide.straight(time)) / std::exp(glide.size * std::exp(-time / glide.decay));
-    }
-    const double gain = std::exp(-glide.damping * (phase - time));
-    for (std::size_t c = 0; c < sound.size(); ++c) {
-      straight[c].push_back(gain * interpolation()(sound[c], std::max(0.0, time)));
+  const std::vector<double> times = times_of(glide, sound[0].size());
+  Channels straight;
+  for (const std::vector<double>& channel : sound) {
+    std::vector<double>& samples = straight.emplace_back();
+    for (const double time : times) {
+      const auto phase = static_cast<double>(samples.size());
+      samples.push_back(std::exp(-glide.damping * (phase - time)) * interpolation()(channel, time));
     }
   }
   return straight;

@@ -721,9 +721,11 @@ void follow_glide(std::vector<Found>& all, const std::vector<DampedMode>& modes,
     const Channels straight = without_glide(
         blow.channels, {glide.size + step.size, glide.decay + step.decay, glide.damping});
     DampedFit fit(straight);
-    fit.set_poles(poles_of(modes));
+    if (!fit.set_poles(poles_of(modes))) {
+      continue;
+    }
     fit.refine(4, settled, progress);
-    for (std::size_t k = 0; k < all.size() && k < fit.modes().size(); ++k) {
+    for (std::size_t k = 0; k < all.size(); ++k) {
       DampedDeviation& deviation = all[k].deviation;
       const Complex moved = fit.modes()[k].log_z - modes[k].log_z;
       deviation.alpha = std::hypot(deviation.alpha, moved.real());
@@ -869,31 +871,28 @@ void warn_of_recording(const Blow& blow, Identification& found) {
   }
 }
 
-// Identifies the modes beside a glide.
+// Identifies the modes of a recording's blow beside a glide.
 Result<Identification> identify_beside(const FoundGlide& falling, const Recording& recording,
-                                       const IdentifyOptions& options, const Progress& progress) {
-  auto blow = find_blow(recording);
-  if (!blow) {
-    return blow.error();
-  }
+                                       Blow blow, const IdentifyOptions& options,
+                                       const Progress& progress) {
   const double rate_hz = recording.rate_hz;
-  Identification made{.rate_hz = rate_hz, .onset_s = static_cast<double>(blow->first) / rate_hz};
-  made.sound = without_glide(blow->channels, falling.glide);
+  Identification made{.rate_hz = rate_hz, .onset_s = static_cast<double>(blow.first) / rate_hz};
+  made.sound = without_glide(blow.channels, falling.glide);
   const std::size_t least = std::max(choices[0], options.least_modes);
   const std::size_t most = std::max({least_fitted, least, options.most_modes});
   std::optional<Search> search(std::in_place, made.sound, least, most, progress);
   search_all(*search, rate_hz);
-  if (blow->skipped > 0) {
+  if (blow.skipped > 0) {
     auto whole = find_blow(recording, false);
-    if (!explains_clipped(search->fit(), *whole, blow->skipped)) {
-      blow = std::move(whole);
-      made.sound = without_glide(blow->channels, falling.glide);
+    if (!explains_clipped(search->fit(), *whole, blow.skipped)) {
+      blow = *std::move(whole);
+      made.sound = without_glide(blow.channels, falling.glide);
       search.emplace(made.sound, least, most, progress);
       search_all(*search, rate_hz);
     }
   }
   made.analysed_s = static_cast<double>(made.sound[0].size()) / rate_hz;
-  warn_of_recording(*blow, made);
+  warn_of_recording(blow, made);
   // A residual at the level of rounding errors contains no blow.
   const double rest_share = search->fit().rest_energy() / std::max(energy_in(made.sound), 1e-300);
   if (const std::size_t head = blow_frames(search->fit().rest(), rate_hz);
@@ -911,13 +910,13 @@ Result<Identification> identify_beside(const FoundGlide& falling, const Recordin
     // The fit moves the poles, so the second test can fail although the first one did not.
     if (continues_back() && (free.finish(), continues_back())) {
       made.sound = std::move(later);
-      blow->skipped += head;
+      blow.skipped += head;
       search.emplace(made.sound, least, most, progress);
       search->start(poles_of(free.fit().modes()));
     }
   }
   const std::size_t frames = made.sound[0].size();
-  const auto skipped = static_cast<double>(blow->skipped);
+  const auto skipped = static_cast<double>(blow.skipped);
   made.skipped_s = skipped / rate_hz;
   made.analysed_s = static_cast<double>(frames) / rate_hz;
   const auto fates = [&](bool must_be_known) {
@@ -926,7 +925,7 @@ Result<Identification> identify_beside(const FoundGlide& falling, const Recordin
       all.push_back(fate_of(found, rate_hz, frames, must_be_known));
       extrapolate_back(found, skipped);
       all.back() =
-          all.back() == Fate::kept && is_too_loud(found, blow->peak) ? Fate::unfit : all.back();
+          all.back() == Fate::kept && is_too_loud(found, blow.peak) ? Fate::unfit : all.back();
     }
     return all;
   };
@@ -1021,7 +1020,7 @@ Result<Identification> identify_beside(const FoundGlide& falling, const Recordin
   }
   if (falling.glide.size > 0.0) {
     made.fall = fall_of(falling, rate_hz);
-    follow_glide(kept, modes, falling, *blow, progress);
+    follow_glide(kept, modes, falling, blow, progress);
   }
   for (const Found& found : kept) {
     made.modes.push_back(measured(found, rate_hz, time_zero));
@@ -1034,7 +1033,7 @@ Result<Identification> identify_beside(const FoundGlide& falling, const Recordin
     }
   }
   if (falling.glide.size > 0.0) {
-    made.sound = std::move(blow->channels);
+    made.sound = std::move(blow.channels);
     made.residual = rest_beside(falling.glide, made.sound, kept, skipped);
   }
   made.residual_db = decibels(energy_in(made.residual) / std::max(energy_in(made.sound), 1e-300));
@@ -1061,14 +1060,14 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
   if (!blow) {
     return blow.error();
   }
-  auto constant = identify_beside({}, recording, options, progress);
+  auto constant = identify_beside({}, recording, *blow, options, progress);
   const FoundGlide falling = find_glide(blow->channels, recording.rate_hz, progress);
   if (falling.glide.size == 0.0) {
     return constant;
   }
   // Groups of close modes describe a falling pitch as well. The glide is better if it leaves less,
   // or about as little with fewer modes.
-  auto gliding = identify_beside(falling, recording, options, progress);
+  auto gliding = identify_beside(falling, recording, *blow, options, progress);
   if (gliding && constant) {
     const bool has_fewer = gliding->modes.size() < constant->modes.size();
     const double most_db = constant->residual_db + (has_fewer ? little_db : -little_db);
