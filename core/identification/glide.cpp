@@ -390,9 +390,7 @@ FoundGlide find_glide(const Channels& sound, double rate_hz, const Progress& pro
   if (glide.size < certain * size) {
     return {};
   }
-  return {.glide = glide,
-          .deviation = {size, glide.decay * std::hypot(along, across)},
-          .steps = {{size, glide.decay * along}, {0.0, glide.decay * across}}};
+  return {.glide = glide, .steps = {{size, glide.decay * along}, {0.0, glide.decay * across}}};
 }
 
 }  // namespace ressort::identification

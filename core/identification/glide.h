@@ -31,9 +31,7 @@ struct Glide {
 
 struct FoundGlide {
   Glide glide;
-  // Standard deviations, and their covariance's two principal steps.
-  Glide deviation;
-  Glide steps[2];
+  Glide steps[2];  // independent errors of one standard deviation each; the second has no size
 };
 
 // Fits a glide together with one to five modes below 1 kHz. Returns a glide of size 0 if modes of

@@ -707,8 +707,9 @@ std::vector<Found> all_found(Search& search) {
 
 FallingPitch fall_of(const FoundGlide& found, double rate_hz) {
   constexpr double cents = 1200.0 / std::numbers::ln2;
-  return {.cents = {cents * found.glide.size, cents * found.deviation.size},
-          .decay_s = {found.glide.decay / rate_hz, found.deviation.decay / rate_hz}};
+  const auto& [one, other] = found.steps;
+  return {.cents = {cents * found.glide.size, cents * one.size},
+          .decay_s = {found.glide.decay / rate_hz, std::hypot(one.decay, other.decay) / rate_hz}};
 }
 
 // Gives the modes the damping that they have beside the glide, and adds to their deviations how far

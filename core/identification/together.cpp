@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <string>
 
 #include "core/identification/identify.h"
 
@@ -47,7 +48,8 @@ Result<Identification> identify_together(std::span<const Recording> recordings,
   for (const Recording& recording : recordings) {
     const auto blow = find_blow(recording, false);
     if (!blow) {
-      return blow.error();
+      return Error{"recording " + std::to_string(energies.size() + 1) + ": " +
+                   blow.error().message};
     }
     double energy = 0.0;
     for (const std::vector<double>& channel : blow->channels) {

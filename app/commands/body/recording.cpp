@@ -58,9 +58,6 @@ Result<Identification> identify_recordings(std::span<const std::string> paths,
       return Error{"'" + path + "' has another sample rate or number of channels than '" +
                    paths[0] + "'; convert it first"};
     }
-    if (auto blow = find_blow(*recording); !blow && paths.size() > 1) {
-      return Error{"'" + path + "': " + blow.error().message};
-    }
     recordings.push_back(*std::move(recording));
   }
   auto found = identify_together(recordings, options, progress);

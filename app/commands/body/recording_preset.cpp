@@ -29,10 +29,9 @@ double power_at(double hertz, const NoiseBand& band) {
 
 // A band of noise is heard through a mode of its own.
 struct Carrier {
-  Carrier(const NoiseBand& given, double lowest_hz)
+  explicit Carrier(const NoiseBand& given)
       : band(given),
-        // The lowest mode sets the pitch, so no carrier is below it.
-        hertz(std::max(1.01 * lowest_hz, std::sqrt(given.low_hz * given.high_hz))),
+        hertz(std::sqrt(given.low_hz * given.high_hz)),
         t60_s(std::log(1000.0) * noise_quality / (std::numbers::pi * hertz)) {
     const double r = std::pow(10.0, -3.0 / (model_rate_hz * t60_s));
     const double theta = 2.0 * std::numbers::pi * hertz / model_rate_hz;
@@ -132,26 +131,24 @@ std::string knob(const std::string& from, const std::string& to, const std::stri
          "\"\nrange = " + range + "\n";
 }
 
+double energy_of(const IdentifiedMode& mode) {
+  double square = 0.0;
+  for (const Measured& amplitude : mode.amplitude) {
+    square += amplitude.value * amplitude.value;
+  }
+  return square * mode.t60_s.value;
+}
+
 // Returns the frequency of the mode with the most energy.
 double loudest_hz(const Identification& found) {
-  const auto energy = [](const IdentifiedMode& mode) {
-    double square = 0.0;
-    for (const Measured& amplitude : mode.amplitude) {
-      square += amplitude.value * amplitude.value;
-    }
-    return square * mode.t60_s.value;
-  };
-  return std::ranges::max_element(found.modes, {}, energy)->frequency_hz.value;
+  return std::ranges::max_element(found.modes, {}, energy_of)->frequency_hz.value;
 }
 
 // Returns the energy of the modes in one of several recordings.
 double energy_at(const Identification& found, std::size_t recording) {
   double energy = 0.0;
   for (std::size_t k = 0; k < found.modes.size(); ++k) {
-    for (const Measured& amplitude : found.modes[k].amplitude) {
-      const double size = amplitude.value * hit_of(found, recording, k);
-      energy += size * size * found.modes[k].t60_s.value;
-    }
+    energy += energy_of(found.modes[k]) * std::pow(hit_of(found, recording, k), 2.0);
   }
   return energy;
 }
@@ -204,10 +201,14 @@ std::string played_model(const Identification& found, const std::vector<NoiseBan
   const bool is_one = found.hits.empty();
   std::vector<std::string> names =
       is_one ? std::vector<std::string>{"centre", "hit", "edge"} : struck_places(found);
-  // The level of a note follows its velocity, so blows of several strengths get the same energy.
-  std::vector<double> gains(found.hits.size(), 1.0);
-  for (std::size_t r = 0; r < gains.size() && gets_louder(found); ++r) {
-    gains[r] = std::sqrt(energy_at(found, gains.size() - 1) / energy_at(found, r));
+  // The level of a note follows its velocity, so blows of several strengths get the same energy. At
+  // one place they move a mode in the same direction.
+  std::vector<std::vector<double>> hits = found.hits;
+  for (std::size_t r = 0; r < hits.size() && gets_louder(found); ++r) {
+    const double gain = std::sqrt(energy_at(found, hits.size() - 1) / energy_at(found, r));
+    for (double& hit : hits[r]) {
+      hit = gain * std::fabs(hit);
+    }
   }
   for (std::size_t c = 0; c < channels; ++c) {
     names.push_back("mic" + std::to_string(c + 1));
@@ -236,20 +237,15 @@ std::string played_model(const Identification& found, const std::vector<NoiseBan
     for (const double factor : {1.0 / tilt, 1.0, tilt}) {
       text += is_one ? " " + five_digits(shapes[k].hit * factor) : "";
     }
-    for (std::size_t r = 0; r < gains.size(); ++r) {
-      // Blows of several strengths at one place move a mode in the same direction.
-      const double hit = gets_louder(found) ? std::fabs(hit_of(found, r, k)) : hit_of(found, r, k);
-      text += " " + five_digits(gains[r] * shapes[k].hit * hit);
+    for (const std::vector<double>& hit : hits) {
+      text += " " + five_digits(shapes[k].hit * hit[k]);
     }
     for (std::size_t c = 0; c < channels; ++c) {
       text += " " + five_digits(shapes[k].position[c]) + " " + five_digits(shapes[k].velocity[c]);
     }
     text += "\n";
   }
-  std::vector<Carrier> carriers;
-  for (const NoiseBand& band : noise) {
-    carriers.emplace_back(band, lowest_hz);
-  }
+  std::vector<Carrier> carriers(noise.begin(), noise.end());
   remove_overlap(carriers);
   const std::string carrier = noise_label(label);
   if (!noise.empty()) {

@@ -147,10 +147,9 @@ std::string body_model(const Identification& found, const std::string& label,
     const double share = std::sqrt(variance) / square;
     text += "@" + label + "_" + std::to_string(k + 1) + " mode @" + label + " " +
             known_digits(mode.frequency_hz.value, mode.frequency_hz.deviation) + " " +
-            known_digits(mode.t60_s.value, mode.t60_s.deviation) + " " +
-            known_digits(shapes[k].hit * hit_of(found, 0, k), 0.5 * share * shapes[k].hit);
-    for (std::size_t r = 1; r < hits.size(); ++r) {
-      text += " " + known_digits(shapes[k].hit * hit_of(found, r, k), share * shapes[k].hit);
+            known_digits(mode.t60_s.value, mode.t60_s.deviation);
+    for (std::size_t r = 0; r < hits.size(); ++r) {
+      text += " " + known_digits(shapes[k].hit * hit_of(found, r, k), 0.5 * share * shapes[k].hit);
     }
     for (const double heard : shapes[k].heard) {
       text += " " + known_digits(heard, share * std::fabs(shapes[k].hit));

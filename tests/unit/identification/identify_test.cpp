@@ -506,36 +506,63 @@ TEST_CASE("A mode limit keeps the strongest modes, none below the floor", "[iden
   }
 }
 
+// A drum: a tone with a T60 of 0.4 s, and half as loud another at 1.59 times its frequency. Both
+// start `cents` sharp, and the cents fall by the factor e in 0.1 s.
+std::vector<double> falling(double hz, double cents, double second_t60_s, const double phases[2]) {
+  std::vector<double> sound(44100);
+  double turns = 0.0;
+  for (std::size_t n = 0; n < sound.size(); ++n) {
+    const double t = static_cast<double>(n) / 44100.0;
+    const double turn = 2.0 * std::numbers::pi * turns;
+    sound[n] =
+        std::exp(-std::log(1000.0) / 0.4 * t) * std::cos(turn + phases[0]) +
+        0.5 * std::exp(-std::log(1000.0) / second_t60_s * t) * std::cos(1.59 * turn + phases[1]);
+    turns += hz / 44100.0 * std::exp2(cents / 1200.0 * std::exp(-t / 0.1));
+  }
+  return sound;
+}
+
+// The second mode decays at another rate than the loudest one, so its envelope at equal steps of
+// phase is no exponential. Without a correction its T60 would be off by 7 %.
+TEST_CASE("Modes that decay at other rates beside a fall have their own T60", "[identify]") {
+  Random random(97);
+  const double phases[] = {-1.0, 2.0};
+  const Identification found =
+      identified({with_noise(falling(150.0, 300.0, 0.2, phases), 0.007, random)});
+  REQUIRE(found.modes.size() >= 2);
+  const auto second = std::ranges::min_element(found.modes, {}, [](const IdentifiedMode& mode) {
+    return std::fabs(mode.frequency_hz.value - 1.59 * 150.0);
+  });
+  CHECK(second->t60_s.value == Approx(0.2).epsilon(0.005));
+}
+
 TEST_CASE("The fall of a drum's pitch is measured within its uncertainty", "[identify]") {
-  // A tone with a T60 of 0.4 s and another at 1.59 times its frequency with 0.3 s start 80 cents
-  // sharp. The cents fall by the factor e in 0.1 s. White noise is 20 dB below the first tone.
-  constexpr double rate_hz = 44100.0;
+  // White noise is 20 dB below the first tone.
   const int trials = of_all(6, 200);
-  int within[5] = {};
+  int within[7] = {};
   for (int trial = 0; trial < trials; ++trial) {
     INFO("trial " << trial);
     Random random(static_cast<std::uint64_t>(trial + 94));
     const double hz = random.uniform(100.0, 200.0);
     const double phases[] = {random.uniform(-3.0, 3.0), random.uniform(-3.0, 3.0)};
-    std::vector<double> sound(44100);
-    double turns = 0.0;
-    for (std::size_t n = 0; n < sound.size(); ++n) {
-      const double t = static_cast<double>(n) / rate_hz;
-      const double turn = 2.0 * std::numbers::pi * turns;
-      sound[n] = std::exp(-std::log(1000.0) / 0.4 * t) * std::cos(turn + phases[0]) +
-                 0.5 * std::exp(-std::log(1000.0) / 0.3 * t) * std::cos(1.59 * turn + phases[1]);
-      turns += hz / rate_hz * std::exp2(80.0 / 1200.0 * std::exp(-t / 0.1));
-    }
+    const std::vector<double> sound = falling(hz, 80.0, 0.3, phases);
     const Identification found = identified({with_noise(sound, 0.0707, random)});
-    const auto loudest = std::ranges::max_element(
-        found.modes, {}, [](const IdentifiedMode& mode) { return mode.amplitude[0].value; });
-    REQUIRE(loudest != found.modes.end());
+    const auto mode_at = [&](double wanted_hz) {
+      return std::ranges::min_element(found.modes, {}, [&](const IdentifiedMode& mode) {
+        return std::fabs(mode.frequency_hz.value - wanted_hz);
+      });
+    };
+    REQUIRE(found.modes.size() >= 2);
+    const auto loudest = mode_at(hz);
+    const auto second = mode_at(1.59 * hz);
     const double amplitude = std::exp(-std::log(1000.0) / 0.4 * found.time_zero_s);
     const std::pair<Measured, double> figures[] = {{found.fall.cents, 80.0},
                                                    {found.fall.decay_s, 0.1},
                                                    {loudest->frequency_hz, hz},
                                                    {loudest->t60_s, 0.4},
-                                                   {loudest->amplitude[0], amplitude}};
+                                                   {loudest->amplitude[0], amplitude},
+                                                   {second->frequency_hz, 1.59 * hz},
+                                                   {second->t60_s, 0.3}};
     for (std::size_t i = 0; i < std::size(figures); ++i) {
       const auto& [measured, truth] = figures[i];
       within[i] += std::fabs(measured.value - truth) < 2.0 * measured.deviation ? 1 : 0;
@@ -558,7 +585,7 @@ TEST_CASE("Three modes 3 Hz apart are not a falling pitch", "[identify]") {
     const Identification found = identified({with_noise(ringing(close, 1.0), 0.02, random)});
     falling += found.fall.cents.value > 0.0 ? 1 : 0;
   }
-  CHECK(falling <= trials / 20);
+  CHECK(falling <= trials / 50);
 }
 
 TEST_CASE("A group of close modes is kept although each of them is uncertain", "[identify]") {
