@@ -127,6 +127,29 @@ std::vector<Moments> moments_of(std::span<const double> samples, std::span<const
   return sums;
 }
 
+std::vector<double> explained_energies(std::span<const std::vector<double>> channels,
+                                       std::span<const Complex> log_z) {
+  std::vector<double> energies(log_z.size());
+  for (const std::vector<double>& channel : channels) {
+    const std::vector<Moments> moments = moments_of(channel, log_z);
+    for (std::size_t k = 0; k < log_z.size(); ++k) {
+      energies[k] -= std::norm(moments[k].zeroth) * log_z[k].real();
+    }
+  }
+  return energies;
+}
+
+std::vector<Complex> damped_grid(double lowest_omega, double highest_omega, double ratio,
+                                 double most_quality) {
+  std::vector<Complex> grid;
+  for (double omega = lowest_omega; omega < highest_omega; omega *= ratio) {
+    for (double quality = 2.5; quality < most_quality; quality *= 2.0) {
+      grid.emplace_back(-0.5 * omega / quality, omega);
+    }
+  }
+  return grid;
+}
+
 PowerSums power_sums(const Powers& powers, std::size_t count) {
   // At this distance from z = 1 the closed form still has 12 of 16 digits.
   constexpr double far = 20.0;

@@ -30,6 +30,16 @@ struct Moments {
 };
 std::vector<Moments> moments_of(std::span<const double> samples, std::span<const Complex> log_z);
 
+// Returns the energy of all channels that each mode alone explains, approximated as if it rang for
+// ever.
+std::vector<double> explained_energies(std::span<const std::vector<double>> channels,
+                                       std::span<const Complex> log_z);
+
+// Returns log z of modes of all frequencies and Qs from 2.5 up to a largest one, in steps of a
+// ratio and of octaves.
+std::vector<Complex> damped_grid(double lowest_omega, double highest_omega, double ratio,
+                                 double most_quality);
+
 // The pole z and z^count.
 struct Powers {
   Powers(Complex log_z, std::size_t count)

@@ -98,11 +98,7 @@ class GlideFit {
     }
     const double lowest_omega =
         2.0 * std::numbers::pi * lowest_tone_hz * static_cast<double>(step_) / rate_hz;
-    for (double omega = lowest_omega; omega < 2.0 * std::numbers::pi * highest; omega *= 1.06) {
-      for (double quality = 2.5; quality < 400.0; quality *= 2.0) {
-        grid_.emplace_back(-0.5 * omega / quality, omega);
-      }
-    }
+    grid_ = damped_grid(lowest_omega, 2.0 * std::numbers::pi * highest, 1.06, 400.0);
   }
 
   // Chooses modes one after the other, those that explain the most. Returns the energy that each
@@ -115,13 +111,7 @@ class GlideFit {
       DampedFit fit(straight.sound);
       fit.limit(grid_.front().imag(), 0.0);
       fit.set_poles(poles_);
-      std::vector<double> explained(grid_.size());
-      for (const std::vector<double>& channel : fit.rest()) {
-        const std::vector<Moments> moments = moments_of(channel, grid_);
-        for (std::size_t i = 0; i < grid_.size(); ++i) {
-          explained[i] -= std::norm(moments[i].zeroth) * grid_[i].real();
-        }
-      }
+      const std::vector<double> explained = explained_energies(fit.rest(), grid_);
       progress_.spend(grid_.size() * straight.weights.size() / 4);
       const auto best = std::ranges::max_element(explained) - explained.begin();
       poles_.push_back(grid_[static_cast<std::size_t>(best)]);

@@ -35,6 +35,9 @@ constexpr double settled = 1e-3;
 constexpr double much_more = 1.12;  // 0.5 dB, the energy that dropped modes may have explained.
 constexpr double roughly_settled = 1e-2;  // The same between two searches.
 constexpr double lowest_hz = 15.0;
+// Grid of modes that ESPRIT misses: ratio of its frequencies, and largest Q.
+constexpr double fine = 1.03;
+constexpr double strongly_damped = 50.0;
 constexpr double least_quality = 0.5;
 // Number of standard deviations that a mode must stand above the noise.
 constexpr double sure = 3.0;
@@ -196,8 +199,9 @@ class Search {
     constexpr int rounds = 6;
     progress_.stage("searching for damped modes");
     // From 30 Hz at 44,100 Hz, and four periods in the sound.
-    const std::vector<Complex> grid = damped_grid(
-        std::max(0.004, 8.0 * std::numbers::pi / static_cast<double>(frames())), highest_omega);
+    const std::vector<Complex> grid =
+        damped_grid(std::max(0.004, 8.0 * std::numbers::pi / static_cast<double>(frames())),
+                    highest_omega, fine, strongly_damped);
     for (int round = 0; round < rounds && fit_.modes().size() < most_; ++round) {
       const double before = fit_.rest_energy();
       if (before < rounding * sound_energy_) {
@@ -264,7 +268,8 @@ class Search {
     const double lowest_omega =
         2.0 * std::numbers::pi * std::max(lowest_hz / rate_hz, 1.0 / static_cast<double>(frames()));
     fit_.limit(lowest_omega, least_alpha);
-    const std::vector<Complex> grid = damped_grid(1.4 * lowest_omega, highest_omega(rate_hz));
+    const std::vector<Complex> grid =
+        damped_grid(1.4 * lowest_omega, highest_omega(rate_hz), fine, strongly_damped);
     std::vector<Complex> pool = poles_of(fit_.modes());
     std::ranges::copy(grid, std::back_inserter(pool));
     shrink(count);
@@ -348,18 +353,6 @@ class Search {
   std::size_t frames() const { return sound_[0].size(); }
 
  private:
-  // Returns log z of strongly damped modes.
-  static std::vector<Complex> damped_grid(double lowest_omega, double highest_omega) {
-    constexpr double step = 1.03;
-    std::vector<Complex> grid;
-    for (double omega = lowest_omega; omega < highest_omega; omega *= step) {
-      for (double quality = 2.5; quality < 50.0; quality *= 2.0) {
-        grid.emplace_back(-0.5 * omega / quality, omega);
-      }
-    }
-    return grid;
-  }
-
   void forget_old() {
     if (known_version_ != fit_.version()) {
       noise_.reset();
@@ -375,16 +368,11 @@ class Search {
   // Returns the poles, those that explain the most energy on their own first.
   std::vector<Ranked> rank(const std::vector<Complex>& poles,
                            const std::vector<std::vector<double>>& sound) const {
+    const std::vector<double> energies = explained_energies(sound, poles);
+    progress_.spend(sound.size() * sound[0].size() * poles.size() / 4);
     std::vector<Ranked> ranked;
-    for (const Complex log_z : poles) {
-      ranked.push_back({0.0, log_z});
-    }
-    for (const std::vector<double>& channel : sound) {
-      const std::vector<Moments> moments = moments_of(channel, poles);
-      for (std::size_t k = 0; k < poles.size(); ++k) {
-        ranked[k].explained -= std::norm(moments[k].zeroth) * poles[k].real();
-      }
-      progress_.spend(channel.size() * poles.size() / 4);
+    for (std::size_t k = 0; k < poles.size(); ++k) {
+      ranked.push_back({energies[k], poles[k]});
     }
     std::ranges::sort(ranked, std::ranges::greater(), &Ranked::explained);
     return ranked;
