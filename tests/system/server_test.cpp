@@ -90,47 +90,57 @@ TEST_CASE("A MIDI event that vanishes before it is read counts as dropped", "[ja
   CHECK(play.exit_code() == 0);
 }
 
+// A stall of the server moves its frames against the wall clock, so all later tags have other
+// frames. A run with such a stall is repeated if the server reported missed periods.
 TEST_CASE("OSC bundles start on the frame of their time tag", "[osc_time]") {
-  const Server server(1024);
-  Child play(program({"play", click(), "-a", "jack", "-i", "-u", osc_port}));
-  REQUIRE(answers());
-  Listener listener(48000 + (notes + 4) * spacing);
-  listener.start("ressort:out_left", "");
-  // NTP time in units of 2^-32 s, as exact as a time tag.
-  lo_timetag now;
-  lo_timetag_now(&now);
-  const unsigned long long start =
-      (static_cast<unsigned long long>(now.sec) << 32 | now.frac) + (1ull << 32);
-  const auto tag = [&](int n) {
-    const long double step = std::ldexp(static_cast<long double>(spacing) / 48000.0L, 32);
-    return start + static_cast<unsigned long long>(llroundl(step * static_cast<long double>(n)));
-  };
-  std::thread sender([&] {
-    for (int n = 0; n < notes; ++n) {
-      const unsigned long long t = tag(n);
-      const lo_timetag when{static_cast<std::uint32_t>(t >> 32), static_cast<std::uint32_t>(t)};
-      const lo_bundle bundle = lo_bundle_new(when);
-      const lo_message message = lo_message_new();
-      lo_message_add_int32(message, 69);
-      lo_message_add_int32(message, 100);
-      lo_bundle_add_message(bundle, "/note/on", message);
-      lo_send_bundle(osc(), bundle);
-      lo_bundle_free_recursive(bundle);
-      std::this_thread::sleep_for(400ms);  // less than the spacing, and never a multiple of it
-    }
-  });
-  const std::size_t begin = listener.frames();
-  const bool heard = listener.wait_for(begin + 48000 + notes * spacing + 4096);
-  sender.join();
-  REQUIRE(heard);
-  const std::size_t first = listener.onset(begin, begin + 96000, 0.01f);
-  REQUIRE(first < begin + 96000);
+  constexpr int most_runs = 6;
   std::size_t worst = 0;
-  for (int n = 0; n < notes; ++n) {
-    const std::size_t expected = first + static_cast<std::size_t>(n) * spacing;
-    const std::size_t found = listener.onset(expected - 2000, expected + spacing / 2, 0.01f);
-    worst = std::max(worst, found > expected ? found - expected : expected - found);
+  int overruns = 0;
+  for (int run = 0; run == 0 || (run < most_runs && overruns > 0 && worst > 0); ++run) {
+    const Server server(1024);
+    Child play(program({"play", click(), "-a", "jack", "-i", "-u", osc_port}));
+    REQUIRE(answers());
+    Listener listener(48000 + (notes + 4) * spacing);
+    listener.start("ressort:out_left", "");
+    const int before = listener.overruns();
+    // NTP time in units of 2^-32 s, as exact as a time tag.
+    lo_timetag now;
+    lo_timetag_now(&now);
+    const unsigned long long start =
+        (static_cast<unsigned long long>(now.sec) << 32 | now.frac) + (1ull << 32);
+    const auto tag = [&](int n) {
+      const long double step = std::ldexp(static_cast<long double>(spacing) / 48000.0L, 32);
+      return start + static_cast<unsigned long long>(llroundl(step * static_cast<long double>(n)));
+    };
+    std::thread sender([&] {
+      for (int n = 0; n < notes; ++n) {
+        const unsigned long long t = tag(n);
+        const lo_timetag when{static_cast<std::uint32_t>(t >> 32), static_cast<std::uint32_t>(t)};
+        const lo_bundle bundle = lo_bundle_new(when);
+        const lo_message message = lo_message_new();
+        lo_message_add_int32(message, 69);
+        lo_message_add_int32(message, 100);
+        lo_bundle_add_message(bundle, "/note/on", message);
+        lo_send_bundle(osc(), bundle);
+        lo_bundle_free_recursive(bundle);
+        std::this_thread::sleep_for(400ms);  // less than the spacing, and never a multiple of it
+      }
+    });
+    const std::size_t begin = listener.frames();
+    const bool heard = listener.wait_for(begin + 48000 + notes * spacing + 4096);
+    sender.join();
+    REQUIRE(heard);
+    overruns = listener.overruns() - before;
+    const std::size_t first = listener.onset(begin, begin + 96000, 0.01f);
+    REQUIRE(first < begin + 96000);
+    worst = 0;
+    for (int n = 0; n < notes; ++n) {
+      const std::size_t expected = first + static_cast<std::size_t>(n) * spacing;
+      const std::size_t found = listener.onset(expected - 2000, expected + spacing / 2, 0.01f);
+      worst = std::max(worst, found > expected ? found - expected : expected - found);
+    }
   }
+  CAPTURE(overruns);
   CHECK(worst == 0);  // frames
   std::printf("OSC bundles: at most %zu frames from the exact spacing\n", worst);
 }
