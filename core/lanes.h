@@ -91,19 +91,6 @@ static inline V exponential(V x) {
   }
 }
 
-// Returns x^y for x >= 0; 0^0 is 1.
-template <class V>
-static inline V power(V x, V y) {
-  if constexpr (sizeof(V) == sizeof(Scalar<V>)) {
-    return std::pow(x, y);
-  } else {
-    for (std::size_t i = 0; i < sizeof(V) / sizeof(Scalar<V>); ++i) {
-      x[i] = std::pow(x[i], y[i]);
-    }
-    return x;
-  }
-}
-
 template <class V>
 static inline V square_root(V x) {
   if constexpr (sizeof(V) == sizeof(Scalar<V>)) {
@@ -144,6 +131,35 @@ static inline bool any_of(Mask mask) {
     Bits bits;
     __builtin_memcpy(&bits, &mask, sizeof mask);
     return folded(bits, [](auto a, auto b) { return a | b; }) != 0;
+  }
+}
+
+// Returns x^y for x >= 0; 0^0 is 1. A small multiple of 1/2, such as Hertz's 1.5, takes a tenth of
+// the time of std::pow().
+template <class V>
+static inline V power(V x, V y) {
+  constexpr std::size_t lanes = sizeof(V) / sizeof(Scalar<V>);
+  constexpr Scalar<V> most = 6;
+  const V twice = y + y;
+  Scalar<V> first;
+  __builtin_memcpy(&first, &twice, sizeof first);
+  if (first >= 0 && first <= most) {
+    const int halves = static_cast<int>(first);
+    if (!any_of(twice != V{} + static_cast<Scalar<V>>(halves))) {
+      V product = halves % 2 == 1 ? square_root(x) : V{} + 1;
+      for (int i = 0; i < halves / 2; ++i) {
+        product *= x;
+      }
+      return product;
+    }
+  }
+  if constexpr (lanes == 1) {
+    return std::pow(x, y);
+  } else {
+    for (std::size_t i = 0; i < lanes; ++i) {
+      x[i] = std::pow(x[i], y[i]);
+    }
+    return x;
   }
 }
 
