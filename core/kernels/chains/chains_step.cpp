@@ -187,6 +187,9 @@ void push_sites(S& s) {
 // Distributes the force on a point to the nodes around it.
 template <class S, class T>
 void spread(const Corners<T>& corners, T force, S s) {
+  if (force == 0) {
+    return;
+  }
   each_corner(corners, [&](std::uint32_t corner, T weight) {
     const PlacedNode& node = s.tap_nodes[corner];
     if (node.force != nowhere) {
