@@ -97,15 +97,17 @@ with {
     const V h = link.gamma * k / 2;
     const V m = 1 + link.gamma * damper;
     const V in = (a - 2 * h * u) / (m + h);
+    const auto was_in = u > V{};
+    const auto stays = was_in & (u + in >= V{});
+    if (!any_of(stays == 0)) {
+      return k * (u + in / 2) + damper * in;
+    }
     const V bounce = square_root(a * a + 4 * m * h * u * u);
     const V out = select(a > V{}, -2 * h * u * u / (a + bounce), (a - bounce) / (2 * m));
     const V past = link.free + t + link.gamma * damper * u;
     const V b = a + 2 * m * u;
     const V hit = square_root(b * b - 4 * (m + h) * u * past);
     const V p = select(b < V{}, -2 * u * past / (hit - b), (b + hit) / (2 * (m + h)));
-
-    const auto was_in = u > V{};
-    const auto stays = was_in & (u + in >= V{});
     const auto enters = past > V{};
     const V step = select(was_in, select(stays, in, out), select(enters, p - u, a / m));
     // A step whose square underflows counts as no step.

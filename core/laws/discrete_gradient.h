@@ -149,6 +149,10 @@ static inline V share_inside(V from, V to) {
 template <class V>
 static inline V share_inside(const LinkState<V>& m, V t) {
   const V depth = m.now + t;
+  const auto is_inside = (m.before() + t > V{}) & (depth > V{}) & (m.free + t > V{});
+  if (!any_of(is_inside == 0)) {
+    return V{} + 1;
+  }
   return (share_inside(m.before() + t, depth) + share_inside(depth, m.free + t)) / 2;
 }
 
