@@ -5,8 +5,8 @@
 // velocity, in position units per sample. A law computes a force f from both, and the step applies
 // F_a -= f and F_b += f. So f > 0 at d > 0 attracts.
 //
-// The laws are those of mi.lib since 2020 (Leonard, Villeneuve, Michon), in their current form,
-// and the contact of Hunt and Crossley (1975).
+// Most laws are those of mi.lib since 2020 (Leonard, Villeneuve, Michon), in their current form.
+// The file of any other law names its source.
 #pragma once
 
 #include <array>
@@ -28,8 +28,8 @@ constexpr bool is_linear(Law law) {
 
 // Scaling of a coefficient with the sample rate and a voice's pitch. With r = 44100 / rate and the
 // voice's stiffness factor s, the coefficient is the value of its formula times r^a s^b, for an
-// inverse 1 over that value. Laws use the first five units. A time constant has no unit: write
-// Z = K lambda instead of lambda.
+// inverse 1 over that value. Laws use the first five units. A factor of both a velocity and another
+// argument, such as lambda in K (1 + lambda v), has no unit: take Z = K lambda as the argument.
 enum class Unit : std::uint8_t {
   plain,              // distances and thresholds: a = 0, b = 0
   stiffness,          // K: a = 2, b = 1
@@ -50,7 +50,7 @@ enum class Role : std::uint8_t {
   stiffness,  // force per distance where the law begins to act
   bend,       // growth of the force beyond that, by a power of the distance
   limit,      // the largest stiffness
-  damping,    // force per velocity
+  damping,    // force per velocity, or any factor of the velocity
   reach,      // distance or speed at which the law begins or ends to act
   shape,      // exponent or profile of the curve
 };
@@ -160,10 +160,11 @@ struct LawFacts {
 
 // The largest slopes of a law's force; not all of them occur at the same place.
 struct Slopes {
-  double stiffness = 0.0;      // |dF/dd|
-  double damping = 0.0;        // dF/dv that scales like the law's damping
-  double stiff_damping = 0.0;  // dF/dv that scales like a stiffness
-  double pull = 0.0;           // dF/dd + 2 stiff_damping at one place; the stability proof needs it
+  double stiffness = 0.0;  // |dF/dd|
+  double damping = 0.0;    // dF/dv that scales like the law's damping
+  // dF/dv that scales like a stiffness; the stability proof uses only its share of `pull`
+  double stiff_damping = 0.0;
+  double pull = 0.0;  // dF/dd + 2 stiff_damping at one place; the stability proof needs it
 };
 
 // The facts of all laws, by Law.
@@ -179,7 +180,7 @@ Law law_named(std::string_view name);
 Slopes steepest(Law law, const LawNumbers& least, const LawNumbers& most, double within);
 
 // Returns the smallest stiffness (pull) and damping of a link at any position of its ends. Not
-// above 0 for a law that may detach.
+// above 0 for a law that may detach, of which only the signs count.
 Slopes gentlest(Law law, const LawNumbers& least);
 
 }  // namespace ressort::laws
