@@ -28,8 +28,9 @@ double held(Law law, const LawNumbers& c, double d) {
       return c[1] / 3.0 * far * far * far;
     case Law::cubic_spring:
       return c[1] / 4.0 * d * d * d * d;
+    case Law::clipped_spring:
     case Law::clipped_contact: {
-      const double deep = std::max(0.0, d + c[4]);
+      const double deep = law == Law::clipped_spring ? far : std::max(0.0, d + c[4]);
       return c[1] * deep * deep <= c[2] - c[0]
                  ? c[0] / 2.0 * deep * deep + c[1] / 4.0 * deep * deep * deep * deep
                  : c[2] / 2.0 * deep * deep - (c[2] - c[0]) * (c[2] - c[0]) / (4.0 * c[1]);
@@ -43,9 +44,12 @@ double held(Law law, const LawNumbers& c, double d) {
       const double hill = std::max(0.0, c[1] * c[1] / 100.0 - d * d);
       return c[0] / 20.0 * slope * slope + 0.45 * c[0] * hill;
     }
-    default:
-      return 0.0;  // Bows store no energy.
+    case Law::bow:
+    case Law::smooth_bow:
+    case Law::either_bow:
+      break;
   }
+  return 0.0;  // Bows store no energy.
 }
 
 double friction(Law law, const LawNumbers& c, double v) {

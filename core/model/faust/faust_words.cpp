@@ -317,9 +317,15 @@ std::string faust_scaled(const std::string& value, Unit unit) {
     case Unit::friction:
     case Unit::speed:
       return value + "*r";
-    default:
-      return value;
+    case Unit::plain:
+    case Unit::inverse_mass:
+    case Unit::inverse_impedance:
+    case Unit::frequency:
+    case Unit::gravity:
+    case Unit::gravity_per_rate:
+      break;
   }
+  return value;
 }
 
 std::string faust_sum(std::vector<std::string> terms) {
