@@ -138,7 +138,6 @@ static inline bool any_of(Mask mask) {
 // the time of std::pow().
 template <class V>
 static inline V power(V x, V y) {
-  constexpr std::size_t lanes = sizeof(V) / sizeof(Scalar<V>);
   constexpr Scalar<V> most = 6;
   const V twice = y + y;
   Scalar<V> first;
@@ -153,10 +152,10 @@ static inline V power(V x, V y) {
       return product;
     }
   }
-  if constexpr (lanes == 1) {
+  if constexpr (sizeof(V) == sizeof(Scalar<V>)) {
     return std::pow(x, y);
   } else {
-    for (std::size_t i = 0; i < lanes; ++i) {
+    for (std::size_t i = 0; i < sizeof(V) / sizeof(Scalar<V>); ++i) {
       x[i] = std::pow(x[i], y[i]);
     }
     return x;
