@@ -108,20 +108,18 @@ TEST_CASE("the force of every law is the slope of its potential", "[laws]") {
 TEST_CASE("the units of every law's arguments keep its sound at every sample rate", "[laws]") {
   // At twice the rate, a velocity per sample is half as large, and a force, as a change of velocity
   // per sample, a quarter. The published spring of mi.lib has a damping of 0.3 K, which does not
-  // follow the rate.
+  // follow the rate, so it is tested at rest.
   constexpr double r = 0.5;
   each_law([&](auto type, Random& random) {
     for (int i = 0; i < draws; ++i) {
       const LawNumbers values = any_arguments(type.facts, random);
-      if (steepest(type.law, values, values, 2.0).stiff_damping > 0.0) {
-        continue;
-      }
       LawNumbers faster = values;
       for (std::size_t k = 0; k < type.facts.count; ++k) {
         faster[k] *= rate_factor(type.facts.arguments[k].unit, r);
       }
       const double d = random.uniform(-2.0, 2.0);
-      const double v = random.uniform(-0.3, 0.3);
+      const bool is_published = steepest(type.law, values, values, 2.0).stiff_damping > 0.0;
+      const double v = is_published ? 0.0 : random.uniform(-0.3, 0.3);
       const double wanted = r * r * law_with<decltype(type)>(values).force(d, v);
       CAPTURE(d, v);
       CHECK(law_with<decltype(type)>(faster).force(d, r * v) == Approx(wanted).epsilon(1e-12));
