@@ -346,6 +346,20 @@ def mirrors(program, browser):
     check(found[1] > 20, "the picture moves")
     check(found[0] < 0.01, "the picture moves symmetrically")
     check(browser.evaluate(picture) != before, "the canvas has changed")
+    keeps_its_width(browser)
+
+
+def keeps_its_width(browser):
+    """News that make the page longer than the window do not make the picture narrower."""
+    width = browser.evaluate("panel.view.width")
+    longer = browser.evaluate("""new Promise(done => {
+      for (let i = 0; i < 12; i++)
+        document.getElementById('news').append(Object.assign(document.createElement('li'), { textContent: 'news' }));
+      const page = document.documentElement;
+      setTimeout(() => done(page.scrollHeight > page.clientHeight), 500);
+    })""")
+    check(longer, "twelve news make the page longer than the window")
+    check(browser.evaluate("panel.view.width") == width, "the picture keeps its width")
 
 
 def keys(program, browser):
