@@ -167,15 +167,20 @@ struct Engine::Player {
     }
     const Press press = keyboard.press_key(event.index, velocity, channel,
                                            parameters.highest_factor(), event.value2);
-    if (press == Press::silent || press == Press::moves) {
-      return;
+    if (press == Press::starts || press == Press::strikes) {
+      begin_note(press, event.index, velocity);
     }
+  }
+
+  // Plays a note on the latest voice, which starts or sounds already.
+  void begin_note(Press press, int key, double velocity) {
+    const std::size_t lane = voices.latest();
     if (press == Press::starts) {
-      gestures.reset_drivers(voices[voices.latest()], voices.latest());
+      gestures.reset_drivers(voices[lane], lane);
     }
-    lfos.restart(voices.latest(), notes, keyboard);
-    strike_note(event.index, velocity);
-    lfos.follow_level(voices.latest(), keyboard);
+    lfos.restart(lane, notes, keyboard);
+    strike_note(key, velocity);
+    lfos.follow_level(lane, keyboard);
   }
 
   // Plays the note controls of the latest voice.
@@ -197,8 +202,10 @@ struct Engine::Player {
     const std::uint8_t channel = event.channel % Channels::count;
     if (const auto earlier =
             keyboard.return_to_held_key(event.index, channel, parameters.highest_factor())) {
-      if (!keyboard.is_legato(channel)) {
-        strike_note(earlier->key, earlier->velocity);
+      if (earlier->press == Press::starts) {
+        begin_note(earlier->press, earlier->key, earlier->velocity);
+      } else if (earlier->press == Press::strikes) {
+        strike_note(earlier->key, earlier->velocity);  // a bow keeps its vibrato
       }
       return;
     }

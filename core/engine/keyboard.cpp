@@ -17,6 +17,11 @@ bool is_on(const Voice& voice, ChannelMask channels) {
   return has_channel(channels, voice.channel);
 }
 
+// Returns a voice's frequency, without bend, at this point of its glide.
+double gliding_hz(const Voice& voice) {
+  return voice.frequency_hz * std::exp2(voice.glide / 12.0);
+}
+
 }  // namespace
 
 Keyboard::Keyboard(const Playing& playing, double rate_hz, std::size_t outputs)
@@ -95,14 +100,16 @@ Press Keyboard::press_key(int key, double velocity, std::uint8_t channel, double
   const bool glides = !held.is_empty() || !is_legato(channel);
   held.press(key, velocity, own_hz);
   Voice* const mono = !is_fixed && is_mono(channel) ? latest_on(channel) : nullptr;
-  if (mono != nullptr && (mono->is_undamped() || (mono->held && !is_struck))) {
+  const bool sounds_on = mono != nullptr && (is_struck ? !rings_on_ && mono->is_undamped()
+                                                       : mono->is_undamped() || mono->held);
+  if (sounds_on) {
     voices.set_latest(*mono);
     attach(*mono, key, channel);
     move_to(*mono, key, own_hz, glides, highest_factor);
     return is_struck ? Press::strikes : Press::moves;
   }
-  if (mono != nullptr && mono->held) {
-    replace(*mono);
+  if (mono != nullptr) {
+    replace_other_keys(*mono, key);
   }
   Voice* const kept = is_fixed ? nullptr : replace_voices_of(key, channel, velocity);
   if (kept != nullptr && !rings_on_) {
@@ -114,25 +121,30 @@ Press Keyboard::press_key(int key, double velocity, std::uint8_t channel, double
   const bool stays = is_fixed && !latest.fading && latest.is_undamped();
   Voice& voice = stays ? latest : voices.take_lane();
   voices.set_latest(voice);
-  const bool starts = !is_fixed || !voice.is_live();
-  if (starts) {
-    voices.start(voices.latest(), hz, channels_.semitones(0));
-    voice.key_hz = note_hz;
-    voice.has_own_pitch = own_hz > 0.0;
-    if (kept != nullptr && kept != &voice) {
-      voices.compare(voice, *kept);
-    }
+  if (is_fixed && voice.is_live()) {
+    attach(voice, key, channel);
+    return Press::strikes;
   }
+  start_voice(key, channel, {.hz = hz, .key_hz = note_hz, .is_own = own_hz > 0.0}, glides);
+  if (kept != nullptr && kept != &voice) {
+    voices.compare(voice, *kept);
+  }
+  return Press::starts;
+}
+
+// Starts the latest lane.
+void Keyboard::start_voice(int key, std::uint8_t channel, const Pitch& pitch, bool glides) {
+  Voice& voice = voices[voices.latest()];
+  voices.start(voices.latest(), pitch.hz, channels_.semitones(0));
+  voice.key_hz = pitch.key_hz;
+  voice.has_own_pitch = pitch.is_own;
   attach(voice, key, channel);
-  if (starts) {
-    voice.volume = level_of(voice);
-  }
+  voice.volume = level_of(voice);
   double& before_hz = last_hz_[channel % Channels::count];
-  if (starts && glides && before_hz > 0.0 && !is_fixed) {
+  if (glides && before_hz > 0.0 && pitch.hz > 0.0) {
     glide_from(voice, before_hz);
   }
-  before_hz = hz;
-  return starts ? Press::starts : Press::strikes;
+  before_hz = pitch.hz;
 }
 
 // From now on the voice is held by this key of this channel.
@@ -167,8 +179,8 @@ Voice* Keyboard::latest_on(std::uint8_t channel) {
       [](const Voice& a, const Voice& b) { return a.turn > b.turn; });
 }
 
-std::optional<HeldKey> Keyboard::return_to_held_key(int key, std::uint8_t channel,
-                                                    double highest_factor) {
+std::optional<ReturnedKey> Keyboard::return_to_held_key(int key, std::uint8_t channel,
+                                                        double highest_factor) {
   HeldKeys& held = held_keys_[channel % Channels::count];
   held.release(key);
   Voice* const voice = latest_on(channel);
@@ -177,10 +189,20 @@ std::optional<HeldKey> Keyboard::return_to_held_key(int key, std::uint8_t channe
       !voice->held || voice->key != key) {
     return std::nullopt;
   }
+  const bool is_struck = !is_legato(channel);
+  const double key_hz = tuning_.note_hz(earlier->key, earlier->frequency_hz);
+  const double hz = tuning_.playable_hz(earlier->key, key_hz, highest_factor);
+  if (is_struck && rings_on_ && hz > 0.0) {
+    replace_other_keys(*voice, earlier->key);
+    voices.set_latest(voices.take_lane());
+    start_voice(earlier->key, channel,
+                {.hz = hz, .key_hz = key_hz, .is_own = earlier->frequency_hz > 0.0}, true);
+    return ReturnedKey{*earlier, Press::starts};
+  }
   voices.set_latest(*voice);
   attach(*voice, earlier->key, channel);
   move_to(*voice, earlier->key, earlier->frequency_hz, true, highest_factor);
-  return earlier;
+  return ReturnedKey{*earlier, is_struck ? Press::strikes : Press::moves};
 }
 
 bool Keyboard::release_key(Voice& voice, int key, std::uint8_t channel, double velocity) const {
@@ -209,6 +231,20 @@ void Keyboard::replace(Voice& voice) const {
   const bool is_damped = voice.decay.kept_goal < 1.0;
   voice.release_s = is_damped ? std::min(voice.release_s, replaced_s) : replaced_s;
   damp(voice);
+}
+
+// Damps the voices of a mono channel, because another key follows. That key is struck on a voice of
+// its own. If it retuned the sounding network within 3 ms, the energy would grow with the
+// stiffness, and a second hammer would be thrown while its gap is still closing. `latest` is the
+// channel's latest voice, from whose pitch the new one glides.
+void Keyboard::replace_other_keys(const Voice& latest, int key) {
+  last_hz_[latest.channel % Channels::count] = gliding_hz(latest);
+  for (Voice& voice : voices) {
+    const bool is_sounding = voice.is_live() && (voice.held || voice.is_undamped());
+    if (is_sounding && voice.has_key && voice.channel == latest.channel && voice.key != key) {
+      replace(voice);
+    }
+  }
 }
 
 // A repeated key damps its earlier voices, as a finger or hammer touches the same string. But a
@@ -432,7 +468,7 @@ void Keyboard::move_to(Voice& voice, int key, double own_hz, bool glides, double
   if (key_hz == voice.key_hz || hz == 0.0) {
     return;
   }
-  const double before_hz = voice.frequency_hz * std::exp2(voice.glide / 12.0);
+  const double before_hz = gliding_hz(voice);
   voice.key_hz = key_hz;
   voice.frequency_hz = hz;
   voice.glide = 0.0;

@@ -35,6 +35,11 @@ struct HeldKey {
   double frequency_hz = 0.0;  // 0: the key's own
 };
 
+// A held key to which a mono channel returns, and the effect on the latest voice.
+struct ReturnedKey : HeldKey {
+  Press press = Press::moves;
+};
+
 // The held keys of one channel in the order of pressing. A mono channel plays the last of them.
 // All functions: [audio] wait-free, O(keys).
 class HeldKeys {
@@ -80,9 +85,10 @@ class Keyboard {
   // `own_hz` above 0 is the note's frequency in place of the key's.
   Press press_key(int key, double velocity, std::uint8_t channel, double highest_factor,
                   double own_hz = 0.0);
-  // Handles a released key on a mono channel: the voice returns to the previous held key. Returns
-  // that key; nullopt if release_key() must handle the event instead.
-  std::optional<HeldKey> return_to_held_key(int key, std::uint8_t channel, double highest_factor);
+  // Handles a released key on a mono channel: the previous held key sounds again. Returns that key;
+  // nullopt if release_key() must handle the event instead.
+  std::optional<ReturnedKey> return_to_held_key(int key, std::uint8_t channel,
+                                                double highest_factor);
   // Handles a released key with release velocity 0..1. Returns whether the voice is released.
   bool release_key(Voice& voice, int key, std::uint8_t channel, double velocity) const;
   void release(Voice& voice) const;
@@ -136,11 +142,19 @@ class Keyboard {
   Voices voices;
 
  private:
+  struct Pitch {
+    double hz = 0.0;      // 0: as the model is written
+    double key_hz = 0.0;  // requested frequency, before the stability limit
+    bool is_own = false;  // given by the note, not by the key
+  };
+
+  void start_voice(int key, std::uint8_t channel, const Pitch& pitch, bool glides);
   void attach(Voice& voice, int key, std::uint8_t channel);
   Voice* latest_on(std::uint8_t channel);
   void hold(Voice& voice) const;
   Voice* replace_voices_of(int key, std::uint8_t channel, double velocity);
   void replace(Voice& voice) const;
+  void replace_other_keys(const Voice& latest, int key);
   void move_to(Voice& voice, int key, double own_hz, bool glides, double highest_factor);
   void glide_from(Voice& voice, double frequency_hz) const;
   void damp(Voice& voice) const;
@@ -153,7 +167,8 @@ class Keyboard {
 
   const Playing& playing_;
   double rate_hz_;
-  bool rings_on_;  // a louder voice rings on beside a repeated key's new one
+  // Notes are blows and plucks, which ring on. If not, a key ends a bow's stroke or the like.
+  bool rings_on_;
   bool is_stereo_;
   Channels channels_;
   VoiceTuning tuning_;

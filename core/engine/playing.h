@@ -122,7 +122,7 @@ struct Playing {
   ChannelMask channels = midi_channels;  // MIDI channels to listen to
   // Parameter that is added to a blow's amount for its length.
   std::optional<std::size_t> hardness;
-  bool mono = false;      // one voice per channel plays the latest held key
+  bool mono = false;      // one note per channel, that of the latest held key
   bool legato = false;    // a key pressed while another is held is not struck
   double glide_s = 0.0;   // portamento time, linear in cents
   NoteShare::Part share;  // the notes that this engine plays, of several engines

@@ -26,7 +26,7 @@ constexpr PresetKey keys[] = {
     {"", "keyboard_map", "text", "a Scala keyboard map beside the preset"},
     {"", "channels", "[1, 2, ...] (all)", "MIDI channels to receive"},
     {"", "velocity", "-1 to 1 (0), or [[0, 0], [64, 90], [127, 127]]", "velocity curve: below 0 softer, above 0 louder; or up to 16 points"},
-    {"", "play", "`poly`, `mono` or `legato` (`poly`)", "`mono`: one voice per channel plays the last key pressed; `legato`: the same, without a new strike while a key is down"},
+    {"", "play", "`poly`, `mono` or `legato` (`poly`)", "`mono`: one note per channel, that of the last key pressed, which ends the one before; `legato`: the same, without a new strike while a key is down"},
     {"", "glide_s", "0 to 60 (0)", "glide time between notes; in legato only between overlapping notes"},
     {"", "motion", "`velocity` or `delayed`", "meaning of the last argument of a mass; overrides the model"},
     {"", "budget", "text", "accuracy, as for `--budget`: `cents=3 t60=5 silence=-60 passive=auto`"},

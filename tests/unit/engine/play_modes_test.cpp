@@ -14,7 +14,9 @@ constexpr double highest = 1e9;
 
 // A keyboard whose released voices ring on, and the calls that an engine makes for keys and pedals.
 struct Keys {
-  explicit Keys(int count, bool mono = false, bool legato = false, double glide_s = 0.0) {
+  explicit Keys(int count, bool mono = false, bool legato = false, double glide_s = 0.0,
+                Gesture gesture = Gesture::impulse) {
+    playing.controls.push_back({.source = Source::note, .gesture = gesture});
     playing.tuning = Tuning::keyboard;
     playing.voices = count;
     playing.mono = mono;
@@ -62,6 +64,10 @@ struct Keys {
   }
   int gated() const {
     return count([](const Voice& voice) { return voice.held; });
+  }
+  // The voices that no later key has ended.
+  int lasting() const {
+    return count([](const Voice& voice) { return !voice.is_replaced; });
   }
   int sounding() const {
     return count([](const Voice& voice) { return voice.held || voice.sustained; });
@@ -147,24 +153,27 @@ TEST_CASE("the sustain pedal holds notes, repeated or not, until it is lifted", 
   CHECK(keys.sounding() == 0);
 }
 
-TEST_CASE("mono plays the latest held key in one voice", "[play_modes]") {
+// A key is struck on a voice of its own, which has a hammer at rest and the key's parameters, and
+// the voice of the key before it is damped.
+TEST_CASE("mono plays the latest held key only", "[play_modes]") {
   Keys keys(8, true);
   CHECK(keys.on(60) == Press::starts);
-  CHECK(keys.on(64) == Press::strikes);
-  CHECK((keys.live() == 1 && keys.on_key(64) == 1));
-  CHECK(keys.on(67) == Press::strikes);
+  CHECK(keys.on(64) == Press::starts);
+  CHECK((keys.lasting() == 1 && keys.latest().key == 64));
+  CHECK(keys.on(67) == Press::starts);
   CHECK(keys.off(64) == std::nullopt);  // not the sounding key
-  CHECK((keys.gated() == 1 && keys.on_key(67) == 1));
+  CHECK((keys.gated() == 1 && keys.lasting() == 1 && keys.latest().key == 67));
   CHECK(keys.off(67) == 60);
-  CHECK((keys.gated() == 1 && keys.on_key(60) == 1));
+  CHECK((keys.gated() == 1 && keys.lasting() == 1 && keys.latest().key == 60));
+  CHECK(keys.latest().is_new);
   CHECK(keys.off(60) == std::nullopt);
-  CHECK(keys.gated() == 0);
-  // A ringing voice is played again.
-  CHECK(keys.on(62) == Press::strikes);
-  CHECK(keys.live() == 1);
+  CHECK((keys.gated() == 0 && keys.lasting() == 1));
+  // A ringing voice ends with the next key.
+  CHECK(keys.on(62) == Press::starts);
+  CHECK((keys.lasting() == 1 && keys.latest().key == 62));
   // Each channel has its own voice.
   CHECK(keys.on(62, 1) == Press::starts);
-  CHECK(keys.live() == 2);
+  CHECK(keys.lasting() == 2);
   CHECK(keys.off(62, 1) == std::nullopt);
   CHECK(keys.gated() == 1);
   // One release is enough for two presses of the same key.
@@ -181,9 +190,9 @@ TEST_CASE("in mono a pedal holds the sound, and keys set its pitch", "[play_mode
   keys.on(64);
   CHECK(keys.off(64) == 60);
   keys.off(60);
-  CHECK((keys.live() == 1 && keys.sounding() == 1 && keys.on_key(60) == 1));
+  CHECK((keys.lasting() == 1 && keys.sounding() == 1 && keys.latest().key == 60));
   keys.on(67);
-  CHECK((keys.live() == 1 && keys.on_key(67) == 1));
+  CHECK((keys.lasting() == 1 && keys.sounding() == 1 && keys.latest().key == 67));
   keys.off(67);
   keys.pedal(false);
   CHECK(keys.sounding() == 0);
@@ -198,8 +207,8 @@ TEST_CASE("legato moves without a new blow while a key is down", "[play_modes]")
   CHECK(keys.gated() == 1);
   CHECK(keys.off(62) == std::nullopt);
   CHECK(keys.gated() == 0);
-  CHECK(keys.on(64) == Press::strikes);  // the ringing voice, struck again
-  CHECK(keys.live() == 1);
+  CHECK(keys.on(64) == Press::starts);
+  CHECK(keys.lasting() == 1);
   CHECK(keys.on(65) == Press::moves);
   CHECK(keys.off(65) == 64);
   CHECK(keys.off(64) == std::nullopt);
@@ -209,21 +218,31 @@ TEST_CASE("legato moves without a new blow while a key is down", "[play_modes]")
   switched.on(60);
   CHECK(switched.on(62) == Press::moves);
   switched.on(60, 1);
-  CHECK(switched.on(62, 1) == Press::strikes);
+  CHECK(switched.on(62, 1) == Press::starts);
 }
 
 TEST_CASE("channel modes select mono and poly regardless of the preset", "[play_modes]") {
   Keys keys(8);
   keys.keyboard->set_mono(2, true);
   keys.on(60, 2);
-  CHECK(keys.on(64, 2) == Press::strikes);
-  CHECK(keys.live() == 1);
+  keys.on(64, 2);
+  CHECK(keys.lasting() == 1);
   keys.on(60);
   CHECK(keys.on(64) == Press::starts);
   Keys mono(8, true);
   mono.keyboard->set_mono(0, false);
   mono.on(60);
   CHECK(mono.on(64) == Press::starts);
+  CHECK(mono.lasting() == 2);
+}
+
+TEST_CASE("a bow plays on in the mono voice", "[play_modes]") {
+  Keys keys(8, true, false, 0.0, Gesture::bow);
+  CHECK(keys.on(60) == Press::starts);
+  CHECK(keys.on(64) == Press::strikes);
+  CHECK((keys.live() == 1 && keys.on_key(64) == 1));
+  CHECK(keys.off(64) == 60);
+  CHECK((keys.live() == 1 && keys.on_key(60) == 1 && !keys.latest().is_replaced));
 }
 
 TEST_CASE("a glide takes its time and ends on the pitch", "[play_modes]") {
@@ -269,7 +288,7 @@ TEST_CASE("a glide takes its time and ends on the pitch", "[play_modes]") {
   CHECK(slow.glide_step == Approx(1.0 * max_block_frames / rate_hz).epsilon(1e-9));
 }
 
-TEST_CASE("a glide is audible, and a mono voice is struck again or moved", "[play_modes]") {
+TEST_CASE("a glide is audible, and a mono key is struck or moves the voice", "[play_modes]") {
   const auto played = [](bool legato, double glide_s) {
     Preset preset = struck(4);
     preset.mono = true;
