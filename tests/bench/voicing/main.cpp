@@ -5,6 +5,7 @@
 //  ressort_voicing --bows N [PRESET...]                bows: N speeds and N pressures, 24 keys
 //  ressort_voicing --played N [PRESET...]              processor time as played, median of N
 //  ressort_voicing --restrikes KEY [PRESET...]         level of a ringing note after a soft strike
+//  ressort_voicing --mono RATE [PRESET...]             level of a change of keys in mono mode
 //  ressort_voicing --tuner RATE [PRESET...]            pitch of every semitone by YIN
 //  ressort_voicing [--seconds S] FILE.mid... [PRESET...]
 //                                                      MIDI files, each to its end or for S seconds
@@ -28,6 +29,7 @@
 #include "app/session/files.h"
 #include "core/engine/limiter.h"
 #include "tests/bench/voicing/midi_files.h"
+#include "tests/bench/voicing/mono.h"
 #include "tests/bench/voicing/played.h"
 #include "tests/bench/voicing/player.h"
 #include "tests/bench/voicing/random_settings.h"
@@ -367,6 +369,7 @@ int run(int argc, char** argv) {
   int restrikes = 0;
   int played = 0;
   double tuner_hz = 0.0;
+  double mono_hz = 0.0;
   std::uint64_t seed = 1;
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
@@ -382,6 +385,8 @@ int run(int argc, char** argv) {
       bows = std::max(1, std::atoi(argv[++i]));
     } else if (word == "--restrikes") {
       restrikes = std::atoi(argv[++i]);
+    } else if (word == "--mono") {
+      mono_hz = std::atof(argv[++i]);
     } else if (word == "--played") {
       played = std::max(1, std::atoi(argv[++i]));
     } else if (word == "--tuner") {
@@ -408,7 +413,7 @@ int run(int argc, char** argv) {
   }
   if (!files.empty()) {
     print_midi_head();
-  } else if (random == 0 && bows == 0 && restrikes == 0 && tuner_hz == 0.0) {
+  } else if (random == 0 && bows == 0 && restrikes == 0 && mono_hz == 0.0 && tuner_hz == 0.0) {
     return print_table(names, step) == 0 ? 0 : 1;
   }
   int failures = 0;
@@ -421,6 +426,9 @@ int run(int argc, char** argv) {
       } else if (restrikes > 0) {
         Player player(name, 44100.0);
         failures += check_restrikes(player, name, restrikes);
+      } else if (mono_hz > 0.0) {
+        Player player(name, mono_hz);
+        failures += check_mono(player, name);
       } else if (tuner_hz > 0.0) {
         Player player(name, tuner_hz, false);
         failures += check_semitones(player, name);
