@@ -61,6 +61,14 @@ struct Ordered {
 
 }  // namespace
 
+double energy_in(std::span<const std::vector<double>> channels) {
+  double sum = 0.0;
+  for (const std::vector<double>& channel : channels) {
+    sum = std::transform_reduce(channel.begin(), channel.end(), channel.begin(), sum);
+  }
+  return sum;
+}
+
 void add_damped(std::span<double> samples, std::span<const Complex> c,
                 std::span<const Complex> log_z) {
   if (log_z.empty()) {

@@ -19,6 +19,9 @@ inline Complex times(Complex a, Complex b) {
   return {a.real() * b.real() - a.imag() * b.imag(), a.real() * b.imag() + a.imag() * b.real()};
 }
 
+// Returns the sum of squares of all samples.
+double energy_in(std::span<const std::vector<double>> channels);
+
 // Adds the sum over k of Re(c[k] z[k]^n) to sample n. O(samples until the modes have decayed)
 void add_damped(std::span<double> samples, std::span<const Complex> c,
                 std::span<const Complex> log_z);

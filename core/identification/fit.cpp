@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -99,9 +100,7 @@ struct Gradient {
       poles[2 * k] = moved.real();
       poles[2 * k + 1] = -moved.imag();
     }
-    for (const double x : rest) {
-      linear(2 * modes.size(), 0) += x;
-    }
+    linear(2 * modes.size(), 0) = std::reduce(rest.begin(), rest.end());
   }
 
   Matrix linear;
@@ -151,13 +150,7 @@ void DampedFit::find_rest() {
 }
 
 double DampedFit::rest_energy() const {
-  double sum = 0.0;
-  for (const std::vector<double>& channel : rest_) {
-    for (const double x : channel) {
-      sum += x * x;
-    }
-  }
-  return sum;
+  return energy_in(rest_);
 }
 
 bool DampedFit::set_poles(const std::vector<Complex>& log_z) {

@@ -46,6 +46,7 @@ class DampedFit {
     lowest_omega_ = lowest_omega;
     least_alpha_ = least_alpha;
   }
+  double lowest_omega() const { return lowest_omega_; }
   // Sets the poles and solves for the best amplitudes. Returns false if the poles cannot be
   // distinguished.
   bool set_poles(const std::vector<Complex>& log_z);

@@ -11,6 +11,7 @@
 #include "core/identification/fit.h"
 #include "core/identification/poles.h"
 #include "core/identification/spectrum.h"
+#include "core/ranges.h"
 
 namespace ressort::identification {
 namespace {
@@ -34,6 +35,7 @@ constexpr double rounding = 1e-24;
 constexpr double settled = 1e-3;
 constexpr double much_more = 1.12;  // 0.5 dB, the energy that dropped modes may have explained.
 constexpr double roughly_settled = 1e-2;  // The same between two searches.
+constexpr double closely_settled = 1e-4;  // The same for modes that overlap.
 constexpr double lowest_hz = 15.0;
 // Grid of modes that ESPRIT misses: ratio of its frequencies, and largest Q.
 constexpr double fine = 1.03;
@@ -57,40 +59,48 @@ class Noise {
   double variance(Complex log_z) const {
     const double alpha = -log_z.real();
     const double omega = log_z.imag();
-    const Power& power = power_of(alpha);
+    const Power& power = powers_[index_of(alpha)];
     const double half_width =
         std::max({8.0 * std::numbers::pi / static_cast<double>(power.frames()), 2.0 * alpha,
                   0.02 * omega, 0.002});
     return power.density(omega, half_width) / static_cast<double>(channels_);
   }
   // Returns the same over a band that has many more degrees of freedom than the fit has taken from
-  // it, and corrects for those taken.
+  // it, and corrects for those taken. Steady noise is better known from a longer time, where the
+  // fit has taken less of it.
   double variance_beside(Complex log_z, const std::vector<DampedMode>& modes) const {
-    const Power& power = power_of(-log_z.real());
-    const double freedoms = static_cast<double>(power.frames() * channels_) / std::numbers::pi;
-    const double half_width = std::max(least_freedoms / (2.0 * freedoms), 0.1 * log_z.imag());
-    const auto near = std::ranges::count_if(modes, [&](const DampedMode& mode) {
-      return std::fabs(mode.log_z.imag() - log_z.imag()) < half_width;
-    });
-    const double all = 2.0 * half_width * freedoms;
-    const double taken = 2.0 * static_cast<double>(near) * static_cast<double>(1 + channels_);
-    return power.density(log_z.imag(), half_width) / static_cast<double>(channels_) * all /
-           std::max(0.5 * all, all - taken);
+    double most = 0.0;
+    for (std::size_t i = 0; i <= index_of(-log_z.real()); ++i) {
+      most = std::max(most, variance_beside(powers_[i], log_z.imag(), modes));
+    }
+    return most;
   }
   // Returns the same between the peaks of the residual (by the median of the density).
   double floor(Complex log_z) const {
-    const Power& power = power_of(-log_z.real());
+    const Power& power = powers_[index_of(-log_z.real())];
     return power.floor(log_z.imag(), std::max({-4.0 * log_z.real(), 0.05 * log_z.imag(), 0.01})) /
            static_cast<double>(channels_);
   }
 
  private:
-  const Power& power_of(double alpha) const {
+  std::size_t index_of(double alpha) const {
     std::size_t i = 0;
     while (i + 1 < powers_.size() && static_cast<double>(powers_[i + 1].frames()) * alpha > 2.0) {
       ++i;
     }
-    return powers_[i];
+    return i;
+  }
+  double variance_beside(const Power& power, double omega,
+                         const std::vector<DampedMode>& modes) const {
+    const double freedoms = static_cast<double>(power.frames() * channels_) / std::numbers::pi;
+    const double half_width = std::max(least_freedoms / (2.0 * freedoms), 0.1 * omega);
+    const auto near = std::ranges::count_if(modes, [&](const DampedMode& mode) {
+      return std::fabs(mode.log_z.imag() - omega) < half_width;
+    });
+    const double all = 2.0 * half_width * freedoms;
+    const double taken = 2.0 * static_cast<double>(near) * static_cast<double>(1 + channels_);
+    return power.density(omega, half_width) / static_cast<double>(channels_) * all /
+           std::max(0.5 * all, all - taken);
   }
 
   std::vector<Power> powers_;  // Spectra of ever shorter beginnings of the residual.
@@ -99,16 +109,6 @@ class Noise {
 
 double decibels(double power) {
   return 10.0 * std::log10(std::max(power, 1e-40));
-}
-
-double energy_in(const std::vector<std::vector<double>>& channels) {
-  double sum = 0.0;
-  for (const std::vector<double>& channel : channels) {
-    for (const double x : channel) {
-      sum += x * x;
-    }
-  }
-  return sum;
 }
 
 // Returns the sum of squares of the mode, approximated as if it rang forever.
@@ -218,6 +218,39 @@ class Search {
     }
   }
 
+  // Separates modes that overlap: adds more strongly damped ones than there are, and removes those
+  // whose place the modes beside them can take. Changes nothing unless the first of them reduce
+  // the residual by a fifth, as they do if the sound is a sum of damped sinusoids.
+  void resolve(double rate_hz) {
+    constexpr int rounds = 12;
+    constexpr double clearly_less = 0.8;
+    constexpr double hardly_less = 0.98;
+    constexpr double much = 0.5;
+    progress_.stage("separating modes that overlap");
+    const DampedFit first = fit_;
+    const double most_rest = clearly_less * first.rest_energy();
+    limit(fit_, rate_hz);
+    const std::vector<Complex> grid =
+        damped_grid(fit_.lowest_omega(), highest_omega(rate_hz), fine, strongly_damped);
+    for (int round = 0; round < rounds && rest_energy() > rounding * sound_energy_; ++round) {
+      const DampedFit before = fit_;
+      add(explaining(grid, 0.0, much));
+      fit_.refine(20, closely_settled, progress_);
+      if (fit_.modes().size() > most_ || rest_energy() > most_rest) {
+        fit_ = before;
+        break;
+      }
+      simplify(rate_hz);
+      if (rest_energy() > hardly_less * before.rest_energy()) {
+        break;
+      }
+    }
+    if (rest_energy() > first.rest_energy()) {
+      fit_ = first;
+    }
+    fit_.limit(0.0, 0.0);
+  }
+
   // Replaces the search by these poles, except those that noise could explain.
   void start(const std::vector<Complex>& poles) {
     fit_.set_poles(poles);
@@ -261,15 +294,12 @@ class Search {
   }
 
   // Fits the `count` modes that explain the most. Starts twice, with all modes found and with none,
-  // and keeps the better set. Each mode decays at least as fast as `least_alpha` and has a period
-  // in the sound.
-  void choose(std::size_t count, double rate_hz, double least_alpha) {
+  // and keeps the better set.
+  void choose(std::size_t count, double rate_hz) {
     progress_.stage("choosing the modes");
-    const double lowest_omega =
-        2.0 * std::numbers::pi * std::max(lowest_hz / rate_hz, 1.0 / static_cast<double>(frames()));
-    fit_.limit(lowest_omega, least_alpha);
+    limit(fit_, rate_hz);
     const std::vector<Complex> grid =
-        damped_grid(1.4 * lowest_omega, highest_omega(rate_hz), fine, strongly_damped);
+        damped_grid(1.4 * fit_.lowest_omega(), highest_omega(rate_hz), fine, strongly_damped);
     std::vector<Complex> pool = poles_of(fit_.modes());
     std::ranges::copy(grid, std::back_inserter(pool));
     shrink(count);
@@ -361,6 +391,104 @@ class Search {
     }
   }
 
+  // Limits the modes that `fit` finds from now on to those that have a period in the sound. A sound
+  // of less than a second does not show whether a tone is steady, so there they decay, too.
+  void limit(DampedFit& fit, double rate_hz) const {
+    const auto length = static_cast<double>(frames());
+    fit.limit(2.0 * std::numbers::pi * std::max(lowest_hz / rate_hz, 1.0 / length),
+              length < rate_hz ? 1.01 / length : 0.0);
+  }
+
+  // Removes modes whose place the modes beside them can take, while the residual grows by no more
+  // than noise explains for each of them, and by little in all.
+  void simplify(double rate_hz) {
+    const double most_rest = much_more * rest_energy();
+    const double wanted = 2.0 * (chance + static_cast<double>(sound_.size() - 1));
+    const Noise noise = this->noise();
+    const std::vector<DampedMode> all = fit_.modes();
+    for (bool goes_on = true; goes_on;) {
+      goes_on = false;
+      std::vector<DampedMode> modes = fit_.modes();
+      const std::vector<double> variances = mapped(
+          modes, [&](const DampedMode& mode) { return noise.variance_beside(mode.log_z, all); });
+      std::vector<std::pair<double, std::size_t>> order;
+      fit_.eliminate([&](const std::vector<double>& drops) {
+        for (std::size_t k = 0; k < drops.size(); ++k) {
+          order.emplace_back(drops[k] / variances[k], k);
+        }
+        return drops.size();
+      });
+      std::ranges::sort(order);
+      std::vector<bool> is_removed(modes.size());
+      for (const auto& [drop, k] : order) {
+        const std::optional<Replaced> others = without(k, is_removed, rate_hz);
+        if (others && others->more < wanted * variances[k] &&
+            rest_energy() + others->more < most_rest) {
+          for (std::size_t i = 0; i < others->places.size(); ++i) {
+            modes[others->places[i]] = others->modes[i];
+          }
+          std::ranges::fill(modes[k].c, Complex());
+          is_removed[k] = goes_on = true;
+          fit_.set_modes(modes);
+        }
+      }
+      std::size_t k = 0;
+      std::erase_if(modes, [&](const DampedMode&) { return is_removed[k++]; });
+      fit_.set_modes(std::move(modes));
+      fit_.refine(10, closely_settled, progress_);
+    }
+    fit_.refine(20, closely_settled, progress_);
+  }
+
+  // The modes beside one that is left out.
+  struct Replaced {
+    std::vector<std::size_t> places;
+    std::vector<DampedMode> modes;
+    double more;  // energy of the residual than with the mode
+  };
+
+  // Leaves mode k out and fits the modes beside it anew, for as long as they ring. Modes that ring
+  // much longer stay as they are. Returns nothing if the others cannot be distinguished.
+  std::optional<Replaced> without(std::size_t k, const std::vector<bool>& is_removed,
+                                  double rate_hz) const {
+    constexpr double much_longer = 16.0;
+    constexpr double nepers = 12.0;  // Decay after which nothing is left to fit.
+    const std::vector<DampedMode>& modes = fit_.modes();
+    const double least_alpha =
+        std::max(-modes[k].log_z.real(), 1.0 / static_cast<double>(frames())) / much_longer;
+    Replaced found;
+    std::vector<DampedMode> local;
+    for (std::size_t j = 0; j < modes.size(); ++j) {
+      if (j != k && !is_removed[j] && -modes[j].log_z.real() > least_alpha &&
+          are_neighbours(modes[j].log_z, modes[k].log_z)) {
+        found.places.push_back(j);
+        local.push_back(modes[j]);
+      }
+    }
+    const std::vector<Complex> others = poles_of(local);
+    local.push_back(modes[k]);
+    const auto window =
+        static_cast<std::ptrdiff_t>(std::min(static_cast<double>(frames()), nepers / least_alpha));
+    std::vector<std::vector<double>> start;
+    for (const std::vector<double>& channel : fit_.rest()) {
+      start.emplace_back(channel.begin(), channel.begin() + window);
+    }
+    const double before = energy_in(start);
+    for (std::size_t c = 0; c < start.size(); ++c) {
+      const auto added = mapped(local, [&](const DampedMode& mode) { return mode.c[c]; });
+      add_damped(start[c], added, poles_of(local));
+    }
+    DampedFit fit(start);
+    limit(fit, rate_hz);
+    if (!fit.set_poles(others)) {
+      return std::nullopt;
+    }
+    fit.refine(20, closely_settled, progress_);
+    found.modes = fit.modes();
+    found.more = fit.rest_energy() - before;
+    return found;
+  }
+
   struct Ranked {
     double explained;  // Energy that the pole alone explains, approximately.
     Complex log_z;
@@ -393,10 +521,10 @@ class Search {
     return strongest;
   }
 
-  // Returns the poles that explain much of the residual, none within twice its damping plus
-  // `distance` of one that explains more.
-  std::vector<Complex> explaining(const std::vector<Complex>& poles, double distance) const {
-    constexpr double much = 0.1;  // Least share of the energy that the best one explains.
+  // Returns the poles that explain at least the share `much` of the energy that the best one
+  // explains, none within twice its damping plus `distance` of one that explains more.
+  std::vector<Complex> explaining(const std::vector<Complex>& poles, double distance,
+                                  double much = 0.1) const {
     std::vector<Complex> best;
     const std::vector<Ranked> ranked = rank(poles, fit_.rest());
     for (const auto& [explained, log_z] : ranked) {
@@ -549,6 +677,7 @@ void search_all(Search& search, double rate_hz) {
   }
   search.add_damped_modes(highest);
   search.finish();
+  search.resolve(rate_hz);
 }
 
 // Returns the number of leading samples that belong to the contact itself rather than to free
@@ -927,8 +1056,6 @@ Result<Identification> identify_beside(const FoundGlide& falling, const Recordin
   made.choices = try_choices(*search, std::max(energy_in(made.sound), 1e-300));
   bool must_be_known = options.least_modes == 0;
   if (options.least_modes > 0) {
-    // A sound of less than a second does not show whether a tone is steady.
-    const double least_alpha = made.analysed_s < 1.0 ? 1.01 / static_cast<double>(frames) : 0.0;
     const Search whole = *search;
     const auto steady_count = [&] {
       return static_cast<std::size_t>(std::ranges::count(fates(false), Fate::steady));
@@ -937,7 +1064,7 @@ Result<Identification> identify_beside(const FoundGlide& falling, const Recordin
     std::size_t steady = 0;
     for (std::size_t now = steady_count(); now >= steady && steady < 8; now = steady_count()) {
       search.emplace(whole);
-      search->choose(options.least_modes + now, rate_hz, least_alpha);
+      search->choose(options.least_modes + now, rate_hz);
       steady = now + 1;
     }
   } else {
