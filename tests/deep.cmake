@@ -6,7 +6,7 @@ list(TRANSFORM ressort_fuzzers PREPEND fuzz_ OUTPUT_VARIABLE ressort_deep_tests)
 list(APPEND ressort_deep_tests arm everything_sanitized everything_more forms_everywhere
   accuracy_everywhere silence_everywhere modes_everywhere calculix_everywhere bodies_everywhere
   bells_everywhere heard_pitch_everywhere tuner_44100 tuner_48000 tuner_96000 restrikes_all
-  command_line_all export_all thorough bench lint scenes_more abuse_long callback_minute bows
+  command_line_all export_all thorough sixty_modes bench lint scenes_more abuse_long callback_minute bows
   settings_more edits_more
   flights_everywhere server_killed installed soak races)
 list(LENGTH ressort_deep_tests ressort_deep_count)
@@ -119,8 +119,10 @@ add_deep_test(settings_more 600 sh -c
 
 # The complete version of tests that the first tier shortens (tests/support/thorough.h).
 add_deep_test(thorough 240 ${CMAKE_COMMAND} -E env RESSORT_THOROUGH=1 $<TARGET_FILE:ressort_tests>
-  "[ask],[heard_pitch],[hybrids],[identify],[models],[modes_passive],[notes_heard],[session],\
-[solid_body],[solid_modes],[watch]")
+  "[ask],[heard_pitch],[hybrids],[identify]~[sixty_modes],[models],[modes_passive],[notes_heard],\
+[session],[solid_body],[solid_modes],[watch]")
+add_deep_test(sixty_modes 450 ${CMAKE_COMMAND} -E env RESSORT_THOROUGH=1
+  $<TARGET_FILE:ressort_tests> "[sixty_modes]")
 
 # Checks that the benchmark runs. No time is asserted. Only tests/run --deep builds it.
 add_custom_target(ressort_deep DEPENDS ressort_bench)
