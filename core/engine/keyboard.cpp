@@ -105,11 +105,13 @@ Press Keyboard::press_key(int key, double velocity, std::uint8_t channel, double
   if (sounds_on) {
     voices.set_latest(*mono);
     attach(*mono, key, channel);
+    replace_other_keys(key, channel);
     move_to(*mono, key, own_hz, glides, highest_factor);
     return is_struck ? Press::strikes : Press::moves;
   }
   if (mono != nullptr) {
-    replace_other_keys(*mono, key);
+    last_hz_[channel % Channels::count] = gliding_hz(*mono);
+    replace_other_keys(key, channel);
   }
   Voice* const kept = is_fixed ? nullptr : replace_voices_of(key, channel, velocity);
   if (kept != nullptr && !rings_on_) {
@@ -193,7 +195,8 @@ std::optional<ReturnedKey> Keyboard::return_to_held_key(int key, std::uint8_t ch
   const double key_hz = tuning_.note_hz(earlier->key, earlier->frequency_hz);
   const double hz = tuning_.playable_hz(earlier->key, key_hz, highest_factor);
   if (is_struck && rings_on_ && hz > 0.0) {
-    replace_other_keys(*voice, earlier->key);
+    last_hz_[channel % Channels::count] = gliding_hz(*voice);
+    replace_other_keys(earlier->key, channel);
     voices.set_latest(voices.take_lane());
     start_voice(earlier->key, channel,
                 {.hz = hz, .key_hz = key_hz, .is_own = earlier->frequency_hz > 0.0}, true);
@@ -201,6 +204,7 @@ std::optional<ReturnedKey> Keyboard::return_to_held_key(int key, std::uint8_t ch
   }
   voices.set_latest(*voice);
   attach(*voice, earlier->key, channel);
+  replace_other_keys(earlier->key, channel);
   move_to(*voice, earlier->key, earlier->frequency_hz, true, highest_factor);
   return ReturnedKey{*earlier, is_struck ? Press::strikes : Press::moves};
 }
@@ -233,16 +237,20 @@ void Keyboard::replace(Voice& voice) const {
   damp(voice);
 }
 
-// Damps the voices of a mono channel, because another key follows. That key is struck on a voice of
-// its own. If it retuned the sounding network within 3 ms, the energy would grow with the
-// stiffness, and a second hammer would be thrown while its gap is still closing. `latest` is the
-// channel's latest voice, from whose pitch the new one glides.
-void Keyboard::replace_other_keys(const Voice& latest, int key) {
-  last_hz_[latest.channel % Channels::count] = gliding_hz(latest);
+// Damps all voices of a mono channel that have another key than this one. A released voice keeps
+// its decay, but no pedal lifts its damper again. The new key is struck on a voice of its own: if
+// it retuned the sounding network within 3 ms, the energy would grow with the stiffness, and a
+// second hammer would be thrown while its gap is still closing.
+void Keyboard::replace_other_keys(int key, std::uint8_t channel) {
   for (Voice& voice : voices) {
-    const bool is_sounding = voice.is_live() && (voice.held || voice.is_undamped());
-    if (is_sounding && voice.has_key && voice.channel == latest.channel && voice.key != key) {
+    if (!voice.is_live() || !voice.has_key || voice.channel != channel || voice.key == key) {
+      continue;
+    }
+    if (voice.is_undamped() || voice.decay.kept_goal == 1.0) {
       replace(voice);
+    } else {
+      voice.is_replaced = true;
+      damp(voice);
     }
   }
 }

@@ -154,7 +154,7 @@ class Keyboard {
   void hold(Voice& voice) const;
   Voice* replace_voices_of(int key, std::uint8_t channel, double velocity);
   void replace(Voice& voice) const;
-  void replace_other_keys(const Voice& latest, int key);
+  void replace_other_keys(int key, std::uint8_t channel);
   void move_to(Voice& voice, int key, double own_hz, bool glides, double highest_factor);
   void glide_from(Voice& voice, double frequency_hz) const;
   void damp(Voice& voice) const;

@@ -221,6 +221,43 @@ TEST_CASE("legato moves without a new blow while a key is down", "[play_modes]")
   CHECK(switched.on(62, 1) == Press::starts);
 }
 
+// A softer blow lets the harder one before it ring on, on a voice of its own.
+TEST_CASE("a key of a mono channel ends both voices of a key that was struck twice",
+          "[play_modes]") {
+  const bool legato = GENERATE(false, true);
+  Keys keys(8, true, legato);
+  const auto strike = [&](int key, double velocity) {
+    keys.keyboard->press_key(key, velocity, 0, highest);
+    keys.keyboard->set_velocity(keys.keyboard->voices[keys.keyboard->voices.latest()], velocity);
+  };
+  strike(60, 0.9);
+  keys.off(60);
+  strike(60, 0.3);
+  CHECK((keys.lasting() == 2 && keys.gated() == 2));
+  strike(64, 0.5);
+  CHECK((keys.lasting() == 1 && keys.gated() == 1 && keys.latest().key == 64));
+  CHECK(keys.off(64) == 60);
+  CHECK((keys.lasting() == 1 && keys.gated() == 1 && keys.latest().key == 60));
+}
+
+TEST_CASE("a pedal does not catch a damped voice that a mono channel has left", "[play_modes]") {
+  const bool is_caught_before = GENERATE(false, true);
+  Keys keys(8, true);
+  keys.playing.damper_s = 1.0;
+  keys.on(60);
+  keys.off(60);
+  for (int block = 0; block < 200; ++block) {
+    keys.keyboard->voices.advance_gains(max_block_frames);
+  }
+  REQUIRE(!keys.latest().is_undamped());
+  keys.pedal(is_caught_before);
+  keys.on(64);
+  keys.pedal(true);
+  CHECK((keys.lasting() == 1 && keys.latest().key == 64));
+  const Voice& before = keys.keyboard->voices[0];
+  CHECK((before.key == 60 && before.decay.kept_goal < 1.0));
+}
+
 TEST_CASE("channel modes select mono and poly regardless of the preset", "[play_modes]") {
   Keys keys(8);
   keys.keyboard->set_mono(2, true);
