@@ -238,6 +238,14 @@ TEST_CASE("a key of a mono channel ends both voices of a key that was struck twi
   CHECK((keys.lasting() == 1 && keys.gated() == 1 && keys.latest().key == 64));
   CHECK(keys.off(64) == 60);
   CHECK((keys.lasting() == 1 && keys.gated() == 1 && keys.latest().key == 60));
+  if (!legato) {  // the legato pedal goes down between the blows and the return to key 60
+    strike(64, 0.9);
+    strike(64, 0.3);
+    CHECK((keys.lasting() == 2 && keys.gated() == 2));
+    keys.keyboard->turn_controller(0, 68, 1.0);
+    CHECK(keys.off(64) == 60);
+    CHECK((keys.lasting() == 1 && keys.gated() == 1 && keys.latest().key == 60));
+  }
 }
 
 TEST_CASE("a pedal does not catch a damped voice that a mono channel has left", "[play_modes]") {
@@ -323,6 +331,37 @@ TEST_CASE("a glide takes its time and ends on the pitch", "[play_modes]") {
   poly.on(71);
   const Voice& slow = poly.latest();
   CHECK(slow.glide_step == Approx(1.0 * max_block_frames / rate_hz).epsilon(1e-9));
+}
+
+TEST_CASE("a struck mono key glides from the pitch that sounds", "[play_modes]") {
+  constexpr double glide_s = 0.1;
+  const auto updates = static_cast<int>(glide_s * rate_hz / max_block_frames);
+  const auto wait_half = [&](Keys& keys) {
+    for (int i = 0; i < updates / 2; ++i) {
+      keys.keyboard->voices.advance_glides();
+    }
+  };
+  Keys keys(8, true, false, glide_s);
+  keys.on(60);
+  keys.on(72);
+  CHECK(keys.latest().glide == Approx(-12.0));
+  wait_half(keys);
+  keys.on(66);
+  CHECK(keys.latest().glide == Approx(0.0).margin(12.0 / updates));
+  keys.on(78);
+  wait_half(keys);
+  CHECK(keys.off(78) == 66);
+  CHECK(keys.latest().glide == Approx(6.0).margin(12.0 / updates));
+}
+
+TEST_CASE("a mono channel returns to a key at the frequency of its note", "[play_modes]") {
+  Keys keys(8, true);
+  keys.keyboard->press_key(60, 0.8, 0, highest, 300.0);
+  keys.on(64);
+  CHECK(keys.off(64) == 60);
+  CHECK(keys.latest().frequency_hz == Approx(300.0));
+  keys.keyboard->retune_key(60, 270.0, true, highest);  // for notes at the key's frequency
+  CHECK(keys.latest().frequency_hz == Approx(300.0));
 }
 
 TEST_CASE("a glide is audible, and a mono key is struck or moves the voice", "[play_modes]") {
