@@ -205,7 +205,7 @@ struct Engine::Player {
       if (earlier->press == Press::starts) {
         begin_note(earlier->press, earlier->key, earlier->velocity);
       } else if (earlier->press == Press::strikes) {
-        strike_note(earlier->key, earlier->velocity);  // a bow keeps its vibrato
+        strike_note(earlier->key, earlier->velocity);  // a bow's vibrato does not restart
       }
       return;
     }

@@ -134,7 +134,7 @@ Press Keyboard::press_key(int key, double velocity, std::uint8_t channel, double
   return Press::starts;
 }
 
-// Starts the latest lane.
+// Starts a voice in the latest lane. It glides from the last pitch of its channel if `glides`.
 void Keyboard::start_voice(int key, std::uint8_t channel, const Pitch& pitch, bool glides) {
   Voice& voice = voices[voices.latest()];
   voices.start(voices.latest(), pitch.hz, channels_.semitones(0));

@@ -167,7 +167,7 @@ class Keyboard {
 
   const Playing& playing_;
   double rate_hz_;
-  // Notes are blows and plucks, which ring on. If not, a key ends a bow's stroke or the like.
+  // Notes are blows or plucks, which ring on. A bow's stroke or a held force ends with its key.
   bool rings_on_;
   bool is_stereo_;
   Channels channels_;

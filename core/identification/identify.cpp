@@ -218,9 +218,10 @@ class Search {
     }
   }
 
-  // Separates modes that overlap: adds more strongly damped ones than there are, and removes those
-  // whose place the modes beside them can take. Changes nothing unless the first of them reduce
-  // the residual by a fifth, as they do if the sound is a sum of damped sinusoids.
+  // Separates modes that overlap. Each round adds strongly damped modes that explain the residual,
+  // fits all modes and removes those that their neighbours can replace. Changes nothing unless the
+  // first round reduces the residual by a fifth, as it does if the sound is a sum of damped
+  // sinusoids.
   void resolve(double rate_hz) {
     constexpr int rounds = 12;
     constexpr double clearly_less = 0.8;
@@ -399,8 +400,8 @@ class Search {
               length < rate_hz ? 1.01 / length : 0.0);
   }
 
-  // Removes modes whose place the modes beside them can take, while the residual grows by no more
-  // than noise explains for each of them, and by little in all.
+  // Removes modes that their neighbours can replace: for each, the residual's energy grows by no
+  // more than noise explains. All of them together add at most 0.5 dB.
   void simplify(double rate_hz) {
     const double most_rest = much_more * rest_energy();
     const double wanted = 2.0 * (chance + static_cast<double>(sound_.size() - 1));
@@ -440,15 +441,15 @@ class Search {
     fit_.refine(20, closely_settled, progress_);
   }
 
-  // The modes beside one that is left out.
+  // The neighbours of a mode, fitted without it.
   struct Replaced {
     std::vector<std::size_t> places;
     std::vector<DampedMode> modes;
-    double more;  // energy of the residual than with the mode
+    double more;  // growth of the residual's energy without the mode
   };
 
-  // Leaves mode k out and fits the modes beside it anew, for as long as they ring. Modes that ring
-  // much longer stay as they are. Returns nothing if the others cannot be distinguished.
+  // Leaves mode k out and fits its neighbours anew, for as long as they ring. Modes that ring much
+  // longer stay as they are. Returns nothing if the neighbours cannot be distinguished.
   std::optional<Replaced> without(std::size_t k, const std::vector<bool>& is_removed,
                                   double rate_hz) const {
     constexpr double much_longer = 16.0;

@@ -513,6 +513,18 @@ TEST_CASE("Two standard deviations contain the truth of sixty modes with a Q of 
   check_trials(all, of_all(0.9, 0.93), 0.005);
 }
 
+TEST_CASE("A weak mode between sixty that overlap is found", "[identify]") {
+  Random random(85);
+  Coverage all;
+  std::vector<KnownMode> known = damped_modes(60, 20.0, 19000.0, random);
+  // Its energy is 2 % of the noise's, 30 dB above the noise that its own numbers can explain.
+  const double hz = 12000.0;
+  known.push_back(
+      {hz, std::log(1000.0) * 200.0 / (std::numbers::pi * hz), 0.0024, random_phase(random)});
+  add_trial(known, -60.0, random, all);
+  check_trials(all, 0.85);
+}
+
 TEST_CASE("A mode limit keeps the strongest modes, none below the floor", "[identify]") {
   const std::vector<KnownMode> known = {{300.0, 1.0, 1.0, 0.0},      // energy 0 dB
                                         {500.0, 0.1, 1.0, 0.0},      // -10 dB
