@@ -131,6 +131,18 @@ TEST_CASE("a fall starts at its depth, which may follow the energy of the note",
   }
 }
 
+TEST_CASE("a mono note to which a channel returns is as a new one", "[lfo]") {
+  Preset preset =
+      moved({.name = "t", .lfo = {.rate_hz = 10.0, .shape = LfoShape::fall}}, "pitch", -80.0, 80.0);
+  preset.mono = true;
+  const auto after = [&](const Event& last) {
+    auto y = heard(preset, {note_on(0, 69), note_on(4096, 72), last});
+    return std::vector<double>(y.begin() + 8192, y.begin() + 44100);
+  };
+  const auto returned = after(note_off(8192, 72));
+  CHECK(returned == after(note_on(8192, 69)));
+}
+
 // Two oscillations per beat are 4 Hz at 120 beats per minute and 6 Hz at 180. The oscillation is at
 // the middle of its turn when the tempo changes, so a jump of the phase would move the pitch by
 // many times the largest step of a vibrato of 6 Hz: 2 pi 6 Hz * 50 cents / 440 Hz.
