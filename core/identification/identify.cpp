@@ -225,7 +225,7 @@ class Search {
   void resolve(double rate_hz) {
     constexpr int rounds = 12;
     constexpr double clearly_less = 0.8;
-    constexpr double hardly_less = 0.98;
+    constexpr double hardly_less = 0.9;
     constexpr double much = 0.5;
     progress_.stage("separating modes that overlap");
     const DampedFit first = fit_;
@@ -407,6 +407,8 @@ class Search {
     const double wanted = 2.0 * (chance + static_cast<double>(sound_.size() - 1));
     const Noise noise = this->noise();
     const std::vector<DampedMode> all = fit_.modes();
+    std::vector<bool> is_needed(all.size());  // None of the modes beside it was fitted since.
+    bool are_all_tried = true;
     for (bool goes_on = true; goes_on;) {
       goes_on = false;
       std::vector<DampedMode> modes = fit_.modes();
@@ -422,21 +424,35 @@ class Search {
       std::ranges::sort(order);
       std::vector<bool> is_removed(modes.size());
       for (const auto& [drop, k] : order) {
-        const std::optional<Replaced> others = without(k, is_removed, rate_hz);
-        if (others && others->more < wanted * variances[k] &&
-            rest_energy() + others->more < most_rest) {
-          for (std::size_t i = 0; i < others->places.size(); ++i) {
-            modes[others->places[i]] = others->modes[i];
-          }
-          std::ranges::fill(modes[k].c, Complex());
-          is_removed[k] = goes_on = true;
-          fit_.set_modes(modes);
+        if (is_needed[k]) {
+          continue;
         }
+        const std::optional<Replaced> others = without(k, is_removed, rate_hz);
+        is_needed[k] = !others || others->more >= wanted * variances[k] ||
+                       rest_energy() + others->more >= most_rest;
+        if (is_needed[k]) {
+          continue;
+        }
+        for (std::size_t i = 0; i < others->places.size(); ++i) {
+          modes[others->places[i]] = others->modes[i];
+          is_needed[others->places[i]] = false;
+        }
+        std::ranges::fill(modes[k].c, Complex());
+        is_removed[k] = goes_on = true;
+        fit_.set_modes(modes);
       }
       std::size_t k = 0;
       std::erase_if(modes, [&](const DampedMode&) { return is_removed[k++]; });
+      std::erase_if(is_needed, [&, j = std::size_t{0}](bool) mutable { return is_removed[j++]; });
       fit_.set_modes(std::move(modes));
       fit_.refine(10, closely_settled, progress_);
+      // The fit of all modes may have moved each of them a little, so all are tried again at the
+      // end.
+      are_all_tried = !goes_on && !are_all_tried;
+      if (are_all_tried) {
+        is_needed.assign(is_needed.size(), false);
+        goes_on = true;
+      }
     }
     fit_.refine(20, closely_settled, progress_);
   }
