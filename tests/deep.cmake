@@ -6,8 +6,8 @@ list(TRANSFORM ressort_fuzzers PREPEND fuzz_ OUTPUT_VARIABLE ressort_deep_tests)
 list(APPEND ressort_deep_tests arm everything_sanitized everything_more forms_everywhere
   accuracy_everywhere silence_everywhere modes_everywhere calculix_everywhere bodies_everywhere
   bells_everywhere heard_pitch_everywhere tuner_44100 tuner_48000 tuner_96000 restrikes_all
-  command_line_all export_all thorough sixty_modes bench lint scenes_more abuse_long callback_minute bows
-  settings_more edits_more
+  command_line_all export_all thorough sixty_modes bench lint scenes_more abuse_long
+  callback_minute bows settings_more edits_more
   flights_everywhere server_killed installed soak races)
 list(LENGTH ressort_deep_tests ressort_deep_count)
 

@@ -125,7 +125,7 @@ class GlideFit {
   void set_poles(const std::vector<Complex>& poles) { poles_ = poles; }
   // Moves the chosen modes and returns the energy left.
   double refine(const Glide& glide) { return refine(without(glide), 30); }
-  double energy() const { return DampedFit(low_).rest_energy(); }
+  double energy() const { return energy_in(low_); }
   double freedoms() const {
     return 2.0 * highest * static_cast<double>(low_.size() * low_[0].size());
   }
