@@ -36,6 +36,8 @@ constexpr double settled = 1e-3;
 constexpr double much_more = 1.12;  // 0.5 dB, the energy that dropped modes may have explained.
 constexpr double roughly_settled = 1e-2;  // The same between two searches.
 constexpr double closely_settled = 1e-4;  // The same for modes that overlap.
+// The same at the minimum: less than noise explains by one parameter in 200 s of sound.
+constexpr double converged = 1e-7;
 constexpr double lowest_hz = 15.0;
 // Grid of modes that ESPRIT misses: ratio of its frequencies, and largest Q.
 constexpr double fine = 1.03;
@@ -246,10 +248,22 @@ class Search {
         break;
       }
     }
-    if (rest_energy() > first.rest_energy()) {
+    overlap_ = rest_energy() < first.rest_energy();
+    if (!overlap_) {
       fit_ = first;
     }
     fit_.limit(0.0, 0.0);
+  }
+
+  // Fits modes that overlap until they are at the minimum: they converge slowly, and their
+  // deviations hold only there.
+  void converge(double rate_hz) {
+    if (overlap_) {
+      progress_.stage("fitting the modes to the sound");
+      limit(fit_, rate_hz);
+      fit_.refine(60, converged, progress_);
+      fit_.limit(0.0, 0.0);
+    }
   }
 
   // Replaces the search by these poles, except those that noise could explain.
@@ -668,6 +682,7 @@ class Search {
   std::optional<std::vector<DampedDeviation>> deviations_;
   std::size_t known_version_ = 0;  // of the fit
   double sound_energy_ = 0.0;
+  bool overlap_ = false;  // resolve() has separated modes.
 };
 
 void search_all(Search& search, double rate_hz) {
@@ -1096,6 +1111,7 @@ Result<Identification> identify_beside(const FoundGlide& falling, const Recordin
     search->fit().set_modes(likely);
     search->remove(are(fates(must_be_known), Fate::unfit));
   }
+  search->converge(rate_hz);
   std::vector<Found> kept;
   double steady_hz = 0.0;
   double steady_energy = 0.0;
