@@ -2,10 +2,12 @@
 // position or a force for every sample. The gestures of gesture.h call it.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <numbers>
+#include <utility>
 
 #include "core/noise.h"
 #include "core/raised_cosine.h"
@@ -111,58 +113,51 @@ class alignas(64) InputDriver {
   double target() const { return target_; }
 
   InputSample next_position() {
-    const double before = bump_;
-    bump_ = next_pulse();
-    InputSample sample = move();
-    sample.value += bump_;
-    sample.velocity += bump_ - before;
+    InputSample sample;
+    fill_positions(1, 1, &sample.value, &sample.velocity);
+    return sample;
+  }
+  InputSample next_force() {
+    InputSample sample;
+    fill_forces(1, 1, &sample.value);
     return sample;
   }
 
-  // Writes the next positions, `step` apart in memory, as repeated calls of next_position() would.
+  // Writes the next positions, `step` apart in memory.
   template <class T>
   void fill_positions(std::size_t frames, std::size_t step, T* value, T* velocity) {
-    for (std::size_t n = 0; n < frames;) {
-      if (motion_ == Motion::follow && !is_struck() && bump_ == 0.0) {
-        n = fill_approach(n, frames, step, value, velocity);
+    for_parts(frames, [&](std::size_t first, std::size_t end, const double* pulses) {
+      std::size_t n = first;
+      if (motion_ == Motion::follow && bump_ == 0.0 && pulses == nullptr) {
+        n = fill_approach(n, end, step, value, velocity);
       }
-      if (n < frames) {
-        const InputSample sample = next_position();
-        value[n * step] = static_cast<T>(sample.value);
-        velocity[n * step] = static_cast<T>(sample.velocity);
-        ++n;
+      double bump = bump_;
+      for (; n < end; ++n) {
+        const double before = std::exchange(bump, pulses != nullptr ? pulses[n - first] : 0.0);
+        const InputSample sample = move();
+        value[n * step] = static_cast<T>(sample.value + bump);
+        velocity[n * step] = static_cast<T>(sample.velocity + (bump - before));
       }
-    }
+      bump_ = bump;
+    });
   }
 
-  // Writes the next forces, `step` apart in memory, as repeated calls of next_force() would.
+  // Writes the next forces, `step` apart in memory.
   template <class T>
   void fill_forces(std::size_t frames, std::size_t step, T* force) {
-    if (motion_ != Motion::follow && pulse_ == 0.0 && blow_left_ == 0 && held_frames_ == 0) {
-      BandNoise noise = burst_noise_;
-      double left = burst_left_;
-      for (std::size_t n = 0; n < frames; ++n) {
-        force[n * step] = static_cast<T>(value_ + next_of_burst(noise, left));
+    for_parts(frames, [&](std::size_t first, std::size_t end, const double* pulses) {
+      for (std::size_t n = first; n < end; ++n) {
+        if (motion_ == Motion::follow) {
+          approach();
+        }
+        double now = value_ + (pulses != nullptr ? pulses[n - first] : 0.0);
+        if (held_frames_ > 0) {
+          now += held_;
+          --held_frames_;
+        }
+        force[n * step] = static_cast<T>(now);
       }
-      burst_noise_ = noise;
-      burst_left_ = left;
-      return;
-    }
-    for (std::size_t n = 0; n < frames; ++n) {
-      force[n * step] = static_cast<T>(next_force().value);
-    }
-  }
-
-  InputSample next_force() {
-    if (motion_ == Motion::follow) {
-      approach();
-    }
-    double force = value_ + next_pulse();
-    if (held_frames_ > 0) {
-      force += held_;
-      --held_frames_;
-    }
-    return {force, 0.0};
+    });
   }
 
  private:
@@ -170,25 +165,42 @@ class alignas(64) InputDriver {
 
   bool is_struck() const { return pulse_ != 0.0 || blow_left_ > 0 || burst_left_ > 0.0; }
 
-  double next_pulse() {
-    double pulse = pulse_;
-    pulse_ = 0.0;
-    if (blow_left_ > 0) {
-      pulse += blow_ * blow_pulse_.at(blow_pulse_.count - blow_left_);
-      --blow_left_;
+  static constexpr std::size_t most_pulses = 64;  // computed at once
+
+  // Calls use(first, end, pulses) for the frames of every part; without pulses these are null.
+  template <class Use>
+  void for_parts(std::size_t frames, Use&& use) {
+    for (std::size_t first = 0; first < frames; first += most_pulses) {
+      const std::size_t end = std::min(frames, first + most_pulses);
+      double pulses[most_pulses];
+      const bool is_pulsed = is_struck();
+      if (is_pulsed) {
+        fill_pulses(end - first, pulses);
+      }
+      use(first, end, is_pulsed ? pulses : nullptr);
     }
-    return pulse + next_of_burst(burst_noise_, burst_left_);
   }
 
-  double next_of_burst(BandNoise& noise, double& left) const {
-    if (!(left > 0.0)) {
-      return 0.0;
+  // Writes the next pulses of blows and bursts. `frames` is not 0.
+  void fill_pulses(std::size_t frames, double* pulses) {
+    std::fill_n(pulses, frames, 0.0);
+    pulses[0] = std::exchange(pulse_, 0.0);
+    for (std::size_t n = 0; n < frames && blow_left_ > 0; ++n, --blow_left_) {
+      pulses[n] += blow_ * blow_pulse_.at(blow_pulse_.count - blow_left_);
+    }
+    if (!(burst_left_ > 0.0)) {
+      return;
     }
     constexpr double inaudible = 1e-5;  // -100 dB of the burst's start
-    const double now = burst_ * left * noise.next();
-    left *= burst_kept_;
-    left = left < inaudible ? 0.0 : left;
-    return now;
+    double noise[most_pulses];
+    burst_noise_.fill(frames, noise);
+    double left = burst_left_;
+    for (std::size_t n = 0; n < frames && left > 0.0; ++n) {
+      pulses[n] += burst_ * left * noise[n];
+      left *= burst_kept_;
+      left = left < inaudible ? 0.0 : left;
+    }
+    burst_left_ = left;
   }
 
   InputSample move() {

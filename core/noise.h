@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <numbers>
+#include <utility>
 
 #include "core/random.h"
 
@@ -41,13 +43,28 @@ class BandNoise {
     gain_ = std::sqrt(0.5 * (1.0 - product_) / variance_of_white);
   }
   double next() {
-    const double x = white_.next();
-    const double y = gain_ * (x - x2_) + sum_ * y1_ - product_ * y2_;
-    x2_ = x1_;
-    x1_ = x;
-    y2_ = y1_;
-    y1_ = y;
-    return y;
+    double sample;
+    fill(1, &sample);
+    return sample;
+  }
+  void fill(std::size_t count, double* samples) {
+    RandomNumbers white = white_;
+    double x1 = x1_;
+    double x2 = x2_;
+    double y1 = y1_;
+    double y2 = y2_;
+    for (std::size_t n = 0; n < count; ++n) {
+      const double x = white.next();
+      const double y = (gain_ * (x - x2) - product_ * y2) + sum_ * y1;
+      samples[n] = y;
+      x2 = std::exchange(x1, x);
+      y2 = std::exchange(y1, y);
+    }
+    white_ = white;
+    x1_ = x1;
+    x2_ = x2;
+    y1_ = y1;
+    y2_ = y2;
   }
 
  private:
