@@ -243,13 +243,15 @@ class Search {
         fit_ = before;
         break;
       }
-      simplify(rate_hz);
+      simplify(rate_hz, false);
       if (rest_energy() > hardly_less * before.rest_energy()) {
         break;
       }
     }
     overlap_ = rest_energy() < first.rest_energy();
-    if (!overlap_) {
+    if (overlap_) {
+      simplify(rate_hz, true);
+    } else {
       fit_ = first;
     }
     fit_.limit(0.0, 0.0);
@@ -415,8 +417,9 @@ class Search {
   }
 
   // Removes modes that their neighbours can replace: for each, the residual's energy grows by no
-  // more than noise explains. All of them together add at most 0.5 dB.
-  void simplify(double rate_hz) {
+  // more than noise explains. All of them together add at most 0.5 dB. The fit of all modes may
+  // move each of them a little; if `is_last`, all are tried again after it.
+  void simplify(double rate_hz, bool is_last) {
     const double most_rest = much_more * rest_energy();
     const double wanted = 2.0 * (chance + static_cast<double>(sound_.size() - 1));
     const Noise noise = this->noise();
@@ -460,9 +463,7 @@ class Search {
       std::erase_if(is_needed, [&, j = std::size_t{0}](bool) mutable { return is_removed[j++]; });
       fit_.set_modes(std::move(modes));
       fit_.refine(10, closely_settled, progress_);
-      // The fit of all modes may have moved each of them a little, so all are tried again at the
-      // end.
-      are_all_tried = !goes_on && !are_all_tried;
+      are_all_tried = is_last && !goes_on && !are_all_tried;
       if (are_all_tried) {
         is_needed.assign(is_needed.size(), false);
         goes_on = true;
