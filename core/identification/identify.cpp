@@ -226,6 +226,7 @@ class Search {
   // sinusoids.
   void resolve(double rate_hz) {
     constexpr int rounds = 12;
+    constexpr std::size_t most_overlapping = 100;  // More would take seconds.
     constexpr double clearly_less = 0.8;
     constexpr double hardly_less = 0.9;
     constexpr double much = 0.5;
@@ -238,8 +239,11 @@ class Search {
     for (int round = 0; round < rounds && rest_energy() > rounding * sound_energy_; ++round) {
       const DampedFit before = fit_;
       add(explaining(grid, 0.0, much));
-      fit_.refine(20, closely_settled, progress_);
-      if (fit_.modes().size() > most_ || rest_energy() > most_rest) {
+      const bool is_quick = fit_.modes().size() <= std::min(most_, most_overlapping);
+      if (is_quick) {
+        fit_.refine(20, closely_settled, progress_);
+      }
+      if (!is_quick || rest_energy() > most_rest) {
         fit_ = before;
         break;
       }
