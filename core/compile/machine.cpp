@@ -30,7 +30,7 @@ struct CoefficientKey {
 class ProgramMaker {
  public:
   ProgramMaker(const Network& network, const Share& share, double rate_hz, bool rescale,
-               std::span<const LinkScheme> schemes)
+               std::span<const Scheme> schemes)
       : network_(network), share_(share), schemes_(schemes) {
     program_.rate_hz = rate_hz;
     program_.rate_ratio = rate_ratio_of(rate_hz, rescale);
@@ -288,8 +288,7 @@ class ProgramMaker {
         ++program_.link_runs.back().count;
         continue;
       }
-      const LinkScheme scheme = scheme_of(order[i]);
-      LinkRun run{.law = link.law, .scheme = scheme.scheme, .first = i, .count = 1};
+      LinkRun run{.law = link.law, .scheme = scheme_of(order[i]), .first = i, .count = 1};
       for (std::size_t k = 0; k < most_law_arguments; ++k) {
         run.coefficients[k] =
             coefficient(link.arguments[k], facts_of(link.law).arguments[k].unit, link.is_fixed);
@@ -324,13 +323,13 @@ class ProgramMaker {
     }
   }
 
-  LinkScheme scheme_of(std::uint32_t link) const {
-    return link < schemes_.size() ? schemes_[link] : LinkScheme{};
+  Scheme scheme_of(std::uint32_t link) const {
+    return link < schemes_.size() ? schemes_[link] : Scheme::plain;
   }
 
   const Network& network_;
   const Share& share_;
-  std::span<const LinkScheme> schemes_;  // [link of the network]
+  std::span<const Scheme> schemes_;  // [link of the network]
   Program program_;
   std::vector<std::uint32_t> node_;  // [mass of the network] node, or nowhere
   std::map<CoefficientKey, std::uint32_t> known_;
@@ -436,7 +435,7 @@ class Divider {
 
 }  // namespace
 
-Machine tabulate(const Network& network, const Culled& culled, std::span<const LinkScheme> schemes,
+Machine tabulate(const Network& network, const Culled& culled, std::span<const Scheme> schemes,
                  std::span<const double> start, double rate_hz, bool rescale,
                  const Progress& progress) {
   Machine machine{.rate_hz = rate_hz,
@@ -462,7 +461,7 @@ Machine make_machine(const Network& network, double rate_hz, bool rescale) {
 }
 
 Program make_program(const Network& network, double rate_hz, bool rescale,
-                     std::span<const LinkScheme> schemes) {
+                     std::span<const Scheme> schemes) {
   const Network whole = expand_macros(network);
   Share everything;
   everything.masses.resize(whole.masses.size());

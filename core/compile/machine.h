@@ -13,12 +13,6 @@ namespace ressort::compile {
 inline constexpr std::size_t most_parts = 32;        // further parts are stepped as one
 inline constexpr std::size_t least_part_masses = 3;  // smaller parts are stepped as one
 
-// The scheme that computes a link's force, as in LinkRun.
-struct LinkScheme {
-  Scheme scheme = Scheme::plain;
-  auto operator<=>(const LinkScheme&) const = default;
-};
-
 // Returns the ratio of 44,100 Hz to the sample rate, or 1 if numbers are not rescaled. Stiffness is
 // multiplied by its square, damping by the ratio.
 inline double rate_ratio_of(double rate_hz, bool rescale) {
@@ -29,7 +23,7 @@ inline double rate_ratio_of(double rate_hz, bool rescale) {
 // first, each in the direct form. For networks without macros. `schemes`: [link]; empty: the
 // published scheme for all. `start`: [parameter] initial values of the voices. O(n log n). [any
 // thread but audio]
-Machine tabulate(const Network& network, const Culled& culled, std::span<const LinkScheme> schemes,
+Machine tabulate(const Network& network, const Culled& culled, std::span<const Scheme> schemes,
                  std::span<const double> start, double rate_hz, bool rescale,
                  const Progress& progress = {});
 
@@ -38,6 +32,6 @@ Machine make_machine(const Network& network, double rate_hz, bool rescale);
 
 // Returns the tables of a network with its macros as one part, without culling.
 Program make_program(const Network& network, double rate_hz, bool rescale,
-                     std::span<const LinkScheme> schemes = {});
+                     std::span<const Scheme> schemes = {});
 
 }  // namespace ressort::compile

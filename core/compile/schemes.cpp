@@ -64,7 +64,7 @@ Schemes choose_schemes(const Network& network, const Budget& budget, const Progr
       continue;
     }
     if (is_junction(link.a) || is_junction(link.b)) {
-      schemes.links[i] = LinkScheme{Scheme::discrete_gradient};
+      schemes.links[i] = Scheme::discrete_gradient;
       continue;
     }
     if (is_linear(link.law)) {
@@ -73,7 +73,7 @@ Schemes choose_schemes(const Network& network, const Budget& budget, const Progr
     first = first == nullptr ? &link : first;
     ++counts[first_with_name(facts_of(link.law).one)];
     if (budget.passive == Passivity::always) {
-      schemes.links[i] = LinkScheme{Scheme::discrete_gradient};
+      schemes.links[i] = Scheme::discrete_gradient;
     }
   }
   std::string all;
@@ -95,8 +95,8 @@ Schemes choose_schemes(const Network& network, const Budget& budget, const Progr
   return schemes;
 }
 
-Network without_passive(const Network& network, std::span<const LinkScheme> schemes) {
-  const auto is_plain = [](const LinkScheme& link) { return link.scheme == Scheme::plain; };
+Network without_passive(const Network& network, std::span<const Scheme> schemes) {
+  const auto is_plain = [](Scheme scheme) { return scheme == Scheme::plain; };
   if (std::ranges::all_of(schemes, is_plain)) {
     return network;
   }

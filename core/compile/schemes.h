@@ -16,7 +16,7 @@
 namespace ressort::compile {
 
 struct Schemes {
-  std::vector<LinkScheme> links;   // [link] of a network without macros
+  std::vector<Scheme> links;       // [link] of a network without macros
   std::vector<std::string> notes;  // a sentence for each law that is made passive
   std::optional<Error> hazard;     // links that may gain energy, with the model's line
 };
@@ -36,6 +36,6 @@ Schemes choose_schemes(const Network& network, const Budget& budget, const Progr
 // Returns the network without passive links, which is the subject of the stability proof. The
 // network keeps the linear spring in a passive link, and passive links with a negative stiffness or
 // damping. With or without macros. O(n). [any thread but audio]
-Network without_passive(const Network& network, std::span<const LinkScheme> schemes);
+Network without_passive(const Network& network, std::span<const Scheme> schemes);
 
 }  // namespace ressort::compile

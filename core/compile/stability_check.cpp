@@ -122,7 +122,7 @@ class StabilityChecker {
     wanted_ = asked_;
     // Passive links are not in the proof, but their stiffness and damping must not be negative.
     for (std::size_t k = 0; k < request_.schemes.size() && !request_.bare; ++k) {
-      if (request_.schemes[k].scheme != Scheme::plain) {
+      if (request_.schemes[k] != Scheme::plain) {
         keep_attractive(request_.expanded.links[k]);
       }
     }
@@ -499,7 +499,7 @@ ParameterBox proved_box(const StabilityCheck& check, const Preset& preset) {
   return box;
 }
 
-Margins find_margins(const Network& network, std::span<const LinkScheme> schemes,
+Margins find_margins(const Network& network, std::span<const Scheme> schemes,
                      const ParameterBox& box, std::span<const Limits> limits, double rate_ratio,
                      const Progress& progress) {
   Network inside = network;  // network with parameter values in the box

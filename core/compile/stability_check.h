@@ -59,7 +59,7 @@ struct StabilityRequest {
   const Network& expanded;  // the same network without macros
   const Preset& preset;
   const std::vector<ParameterInfo>& parameters;  // result of requested_ranges()
-  std::span<const LinkScheme> schemes;           // [link] empty: all as published
+  std::span<const Scheme> schemes;               // [link] empty: all as published
   std::span<const double> start;                 // [parameter] from start_values()
   double rate_hz = 44100.0;
   double rate_ratio = 1.0;
@@ -98,7 +98,7 @@ struct Margins {
 
 // Computes the margins, exactly for up to most_quick_masses and otherwise by the edge bound.
 // `limits`: empty if no parameter may leave the box. O(links), nine times. [any thread but audio]
-Margins find_margins(const Network& network, std::span<const LinkScheme> schemes,
+Margins find_margins(const Network& network, std::span<const Scheme> schemes,
                      const ParameterBox& box, std::span<const Limits> limits, double rate_ratio,
                      const Progress& progress = {});
 

@@ -129,7 +129,7 @@ class Books {
   Books(const Network& network, bool is_published)
       : bare_(make_program(
             network, Network::reference_rate_hz, true,
-            is_published ? std::vector<LinkScheme>() : choose_schemes(network, {}).links)) {
+            is_published ? std::vector<Scheme>() : choose_schemes(network, {}).links)) {
     for (std::uint32_t i = 0; i < bare_.program().position.size(); ++i) {
       nodes_.push_back(i);
     }

@@ -46,7 +46,7 @@ double inverse_mass_of(const Network& network, const Link& link, std::span<const
 
 }  // namespace
 
-std::optional<Bow> find_strongest_bow(const Network& network, std::span<const LinkScheme> schemes,
+std::optional<Bow> find_strongest_bow(const Network& network, std::span<const Scheme> schemes,
                                       const ParameterBox& box, std::span<const double> start,
                                       double rate_ratio) {
   std::optional<Bow> strongest;
@@ -56,7 +56,7 @@ std::optional<Bow> find_strongest_bow(const Network& network, std::span<const Li
     const auto is_junction = [&](std::uint32_t mass) {
       return network.masses[mass].kind == MassKind::junction;
     };
-    if (!is_bow(link.law, schemes[i].scheme) || is_junction(link.a) || is_junction(link.b)) {
+    if (!is_bow(link.law, schemes[i]) || is_junction(link.a) || is_junction(link.b)) {
       continue;
     }
     if (arguments.empty()) {

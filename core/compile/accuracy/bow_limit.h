@@ -26,7 +26,7 @@ struct Bow {
 // Returns the bow with the largest strength / limit, with parameters anywhere in the box and places
 // at their start. Bows on waveguides have no limit, because a waveguide has no inertia. For
 // networks without macros. O(links). [any thread but audio]
-std::optional<Bow> find_strongest_bow(const Network& network, std::span<const LinkScheme> schemes,
+std::optional<Bow> find_strongest_bow(const Network& network, std::span<const Scheme> schemes,
                                       const ParameterBox& box, std::span<const double> start,
                                       double rate_ratio);
 

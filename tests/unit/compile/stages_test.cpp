@@ -127,7 +127,7 @@ TEST_CASE("The margin for keys shrinks towards the limits of a parameter", "[sta
   CHECK(find_margins(network, {}, at(0.5), {}, 1.0).away.empty());
   // Passive links have no stability limit.
   const Network floor = network_of("@g ground 0.\n@m mass 1. 0. 1.\n@c contact @g @m 3. 0.\n");
-  const std::vector<LinkScheme> passive = {{Scheme::discrete_gradient}};
+  const std::vector<Scheme> passive = {Scheme::discrete_gradient};
   CHECK(find_margins(floor, {}, {}, {}, 1.0).whole == Approx(4.0 / 3.0).epsilon(1e-12));
   CHECK(find_margins(floor, passive, {}, {}, 1.0).whole == most_bounded);
 }
