@@ -82,17 +82,16 @@ void add_motion(CLI::App& command, std::optional<ThirdArgument>& third) {
 void add_method(CLI::App& command, std::optional<Method>& method) {
   std::vector<std::string> words = {"auto"};
   std::string all = "auto";
-  for (const auto use : {KernelRow::Use::published, KernelRow::Use::physical}) {
-    for (const Method known : methods_for(use)) {
-      words.emplace_back(method_name(known));
-      all += ", " + words.back();
-    }
+  std::vector<Method> methods = published_methods();
+  methods.push_back(Method::oversampled);
+  for (const Method known : methods) {
+    words.emplace_back(method_name(known));
+    all += ", " + words.back();
   }
   command
       .add_option_function<std::string>(
           "--method", [&method](const std::string& word) { method = method_named(word); },
           "method of computation: " + all)
-      ->check([](const std::string& word) { return removed_method_advice(word); })
       ->check(CLI::IsMember(words).description(""))
       ->type_name("WORD");
 }

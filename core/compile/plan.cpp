@@ -157,7 +157,7 @@ class Chooser {
   }
 
   void consider_identical() {
-    for (const Method method : methods_for(KernelRow::Use::published)) {
+    for (const Method method : published_methods()) {
       if (row_of(method).least_operations == nullptr || may_pay(row_of(method))) {
         consider(method);
       }

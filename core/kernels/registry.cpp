@@ -22,7 +22,6 @@ namespace ressort::kernels {
 namespace {
 
 using Request = KernelRequest;
-using Use = KernelRow::Use;
 
 template <class T, class Tables, template <class> class K>
 std::unique_ptr<Kernel<T>> make(const Program& program, std::size_t voices, Isa isa) {
@@ -31,13 +30,12 @@ std::unique_ptr<Kernel<T>> make(const Program& program, std::size_t voices, Isa 
 
 // Returns the row of kernel K. `Fits` makes its tables.
 template <class Tables, template <class> class K, class Fits>
-constexpr KernelRow row(Method method, std::string_view name, Use use, Fits,
+constexpr KernelRow row(Method method, std::string_view name, Fits,
                         double (*least_operations)(const Program&, const Workload&) = nullptr) {
   return {
       .kind = Form::kind_of<Tables>(),
       .method = method,
       .name = name,
-      .use = use,
       .fits = [](const Request& request) -> std::optional<Form> {
         if (!request.program.waveguides.empty() && !std::is_same_v<Tables, Direct>) {
           return std::nullopt;  // Only the direct kernel has waveguides.
@@ -61,29 +59,28 @@ constexpr KernelRow row(Method method, std::string_view name, Use use, Fits,
 }
 
 constexpr KernelRow rows[] = {
-    row<Chains, ChainsKernel>(Method::chains, "chains", Use::published,
+    row<Chains, ChainsKernel>(Method::chains, "chains",
                               [](const Request& r) { return chains_form(r.program, r.progress); }),
-    row<Grid, GridKernel>(Method::grid, "grid", Use::published,
+    row<Grid, GridKernel>(Method::grid, "grid",
                           [](const Request& r) { return grid_form(r.program, r.progress); }),
-    row<Batch, BatchKernel>(Method::batch, "batch", Use::published,
+    row<Batch, BatchKernel>(Method::batch, "batch",
                             [](const Request& r) { return batch_form(r.program); }),
     row<Modes, ModalKernel>(
-        Method::modal, "modal", Use::published,
+        Method::modal, "modal",
         [](const Request& r) {
           return modal_form(r.program, r.budget, r.progress, r.load.is_untuned,
                             r.load.reaches_beyond());
         },
         least_modal_operations),
     row<Oversampled, OversampledKernel>(
-        Method::oversampled, "oversampled", Use::physical,
+        Method::oversampled, "oversampled",
         [](const Request& r) {
           constexpr std::uint32_t times = 4;  // steps per sample of --method oversampled
           return r.program.moving > 0 && r.program.modes.empty()
                      ? std::optional(oversampled_form(oversampled_program(r.program, times), times))
                      : std::nullopt;
         }),
-    row<Direct, DirectKernel>(Method::direct, "direct", Use::published,
-                              [](const Request&) { return Direct(); }),
+    row<Direct, DirectKernel>(Method::direct, "direct", [](const Request&) { return Direct(); }),
 };
 
 }  // namespace
@@ -108,24 +105,12 @@ std::optional<Method> method_named(std::string_view name) {
   return row == std::end(rows) ? std::nullopt : std::optional(row->method);
 }
 
-std::string removed_method_advice(std::string_view name) {
-  if (name == "dense" || name == "slow") {
-    return "method '" + std::string(name) + "' no longer exists; use auto";
-  }
-  return name == "fourth" ? "method 'fourth' no longer exists; use oversampled, or a budget of "
-                            "cents such as 'cents=3'"
-                          : "";
-}
-
-std::vector<Method> methods_for(KernelRow::Use use) {
-  std::vector<Method> methods;
+std::vector<Method> published_methods() {
+  std::vector<Method> methods = {Method::direct};
   for (const KernelRow& row : rows) {
-    if (row.use == use) {
+    if (row.method != Method::direct && row.method != Method::oversampled) {
       methods.push_back(row.method);
     }
-  }
-  if (use == Use::published) {
-    std::rotate(methods.begin(), methods.end() - 1, methods.end());
   }
   return methods;
 }

@@ -33,15 +33,9 @@ struct KernelRequest {
 };
 
 struct KernelRow {
-  enum class Use {
-    published,  // computes the published scheme, possibly in other coordinates
-    physical,   // approximates the continuous network better, for a budget or by name
-  };
-
   Form::Kind kind;  // type of its tables
   Method method;
   std::string_view name;
-  Use use;
   // Makes the tables of a Program; empty if the kernel cannot play it. [any thread but audio]
   std::optional<Form> (*fits)(const KernelRequest&);
   // Returns a lower bound of the operations, if fits() takes long; else null.
@@ -59,11 +53,10 @@ const KernelRow& row_of(Method method);
 std::string_view method_name(Method method);
 // Returns nothing if no method has that name.
 std::optional<Method> method_named(std::string_view name);
-// Returns what to use instead of a method that earlier versions had; empty for any other name.
-std::string removed_method_advice(std::string_view name);
 
-// Returns the methods of one use, the reference first.
-std::vector<Method> methods_for(KernelRow::Use use);
+// Returns the methods that compute the published scheme, possibly in other coordinates, the
+// reference first. `oversampled` approximates the continuous network better.
+std::vector<Method> published_methods();
 
 // Returns the operations per sample of all voices in the Program's form, with all contacts closed
 // all the time: the worst case for a block's deadline.

@@ -134,7 +134,7 @@ void draw(const plot::Figure& figure, const std::filesystem::path& path) {
 // Returns every form that the machine can have.
 std::vector<Formed> forms_of(const Machine& machine) {
   std::vector<Formed> forms;
-  for (const Method method : methods_for(KernelRow::Use::published)) {
+  for (const Method method : published_methods()) {
     auto form = machine.parts.size() == 1
                     ? row_of(method).fits({machine.parts[0], Workload{}, Budget{}, Progress{}})
                     : std::nullopt;

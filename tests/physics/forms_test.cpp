@@ -23,7 +23,7 @@ using support::show;
 // Returns the forms of all kernels that can play the Program, that of the direct kernel first.
 std::vector<std::pair<Method, Form>> forms_of(const Program& program) {
   std::vector<std::pair<Method, Form>> forms;
-  for (const Method method : methods_for(KernelRow::Use::published)) {
+  for (const Method method : published_methods()) {
     if (const auto form = row_of(method).fits({program, Workload{}, Budget{}, Progress{}})) {
       forms.emplace_back(method, *form);
     }
@@ -148,7 +148,7 @@ void check_networks(const std::vector<Isa>& isas) {
       ++taken[method];
     }
   }
-  for (const Method method : methods_for(KernelRow::Use::published)) {
+  for (const Method method : published_methods()) {
     INFO(method_name(method) << " took " << taken[method] << " of " << networks);
     CHECK(taken[method] >= 20);
   }

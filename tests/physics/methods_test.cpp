@@ -209,7 +209,7 @@ struct Turn {
 // Returns every model with each of its kernels, changing the model every time.
 std::vector<Turn> turns_of(const std::vector<Subject>& all) {
   std::vector<Turn> turns;
-  for (std::size_t round = 0; round < methods_for(KernelRow::Use::published).size(); ++round) {
+  for (std::size_t round = 0; round < published_methods().size(); ++round) {
     for (const Subject& subject : all) {
       if (round < subject.methods.size()) {
         turns.push_back({&subject, *std::next(subject.methods.begin(), std::ptrdiff_t(round))});

@@ -84,7 +84,7 @@ struct StruckTwice {
 void check_strike(const StruckTwice& struck, std::set<Method>& seen) {
   CompileOptions options{.rate_hz = 48000.0, .bare = true, .method = Method::direct};
   const Sound by_input = play(struck.with_input, options, pushed());
-  for (const Method method : methods_for(KernelRow::Use::published)) {
+  for (const Method method : published_methods()) {
     INFO(struck.text << "by " << method_name(method));
     Plan plan;
     options.method = method;
@@ -120,7 +120,7 @@ TEST_CASE("A struck mass moves as a force input would move it", "[strike]") {
       check_strike({text, with_input, struck_at(mass), struck_at(mass)}, seen);
     }
   }
-  CHECK(seen.size() == methods_for(KernelRow::Use::published).size());
+  CHECK(seen.size() == published_methods().size());
 }
 
 // Kernels that compute forces within the sample damp the strike at once when there is damping, by a
@@ -136,7 +136,7 @@ TEST_CASE("A struck mass of any network moves nearly like one with a force input
     }
     const auto& [name, mass] = masses[seed % masses.size()];
     const std::string text = random.text + "\n@in20 frcInput @" + name + "\n";
-    for (const Method method : methods_for(KernelRow::Use::published)) {
+    for (const Method method : published_methods()) {
       INFO("seed " << seed << ", " << random.family << ", " << name << ", by "
                    << method_name(method));
       const CompileOptions options{.rate_hz = 48000.0, .bare = true, .method = method};

@@ -191,10 +191,8 @@ class FlightReader {
       LineWords words(line);
       const bool is_record = !line.empty() && line[0] >= '0' && line[0] <= '9';
       if (!(is_record ? read_record(words) : read_line(words)) || !words.ok) {
-        return Error{!advice_.empty()
-                         ? advice_
-                         : "invalid line in a flight: '" + std::string(line.substr(0, 80)) + "'",
-                     line_, 1};
+        return Error{"invalid line in a flight: '" + std::string(line.substr(0, 80)) + "'", line_,
+                     1};
       }
     }
     if (flight_.engines.empty() || flight_.records.empty()) {
@@ -237,9 +235,9 @@ class FlightReader {
           std::ranges::find_if(precisions, [&](const auto& known) { return known.second == name; });
       words.ok = words.ok && row != std::end(precisions);
       setup.precision = words.ok ? row->first : setup.precision;
-      advice_ = name == "compensated" ? "precision 'compensated' no longer exists; use double" : "";
     } else if (key == "method") {
-      read_method(words);
+      setup.method = method_named(words.word());
+      words.ok = setup.method.has_value();
     } else if (key == "budget") {
       const auto budget = parse_budget(words.rest());
       words.ok = static_cast<bool>(budget);
@@ -271,13 +269,6 @@ class FlightReader {
       return false;
     }
     return words.is_over();
-  }
-
-  void read_method(LineWords& words) {
-    const std::string_view name = words.word();
-    flight_.setup.method = method_named(name);
-    words.ok = flight_.setup.method.has_value();
-    advice_ = removed_method_advice(name);
   }
 
   bool read_text(LineWords& words) {
@@ -352,7 +343,6 @@ class FlightReader {
 
   std::string_view rest_;
   int line_ = 0;
-  std::string advice_;  // replacement of a word that is no longer known
   Flight flight_;
   std::vector<std::shared_ptr<std::vector<SceneFile>>> texts_;  // texts of models and presets
 };

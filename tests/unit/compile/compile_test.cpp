@@ -124,7 +124,7 @@ TEST_CASE("The plan chooses the form with the lowest worst-case cost", "[compile
 
 TEST_CASE("A requested method is used if it can compute the part", "[compile]") {
   const Machine machine = make_machine(network_of(scenes::mesh_20x30()), 44100.0, true);
-  for (const Method method : methods_for(KernelRow::Use::published)) {
+  for (const Method method : published_methods()) {
     const Planned plan = make_plan(machine, {}, method);
     REQUIRE(plan.parts.size() == 1);
     // The mesh is too large for batch and has no rows of equal masses for chains.

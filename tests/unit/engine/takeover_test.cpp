@@ -82,8 +82,8 @@ TEST_CASE("An engine continues from the state of another", "[takeover]") {
   std::set<Method> left;
   std::set<Method> reached;
   for (const auto& [text, stiffness] : {std::pair{body, 1}, std::pair{mesh, 0}}) {
-    for (const Method from : methods_for(KernelRow::Use::published)) {
-      for (const Method to : methods_for(KernelRow::Use::published)) {
+    for (const Method from : published_methods()) {
+      for (const Method to : published_methods()) {
         if (from == Method::modal || !has_form(text, from) || !has_form(text, to)) {
           continue;
         }
@@ -99,8 +99,8 @@ TEST_CASE("An engine continues from the state of another", "[takeover]") {
       }
     }
   }
-  CHECK(left.size() == methods_for(KernelRow::Use::published).size() - 1);
-  CHECK(reached.size() == methods_for(KernelRow::Use::published).size());
+  CHECK(left.size() == published_methods().size() - 1);
+  CHECK(reached.size() == published_methods().size());
 }
 
 TEST_CASE("A modal form cannot reconstruct all masses", "[takeover]") {

@@ -292,10 +292,9 @@ TEST_CASE("An invalid flight is rejected with its line", "[flight]") {
   CHECK(error_of("ressort flight 1\n0 period 0 2\n") ==
         "2: invalid line in a flight: '0 period 0 2'");
   CHECK(error_of("ressort flight 1\nmethod dense\n") ==
-        "2: method 'dense' no longer exists; use auto");
-  CHECK(error_of("ressort flight 1\nmethod fourth\n").find("use oversampled") != std::string::npos);
-  CHECK(error_of("ressort flight 1\nprecision compensated\n") ==
-        "2: precision 'compensated' no longer exists; use double");
+        "2: invalid line in a flight: 'method dense'");
+  CHECK(error_of("ressort flight 1\nprecision single\n") ==
+        "2: invalid line in a flight: 'precision single'");
   for (const std::string share : {"0 2", "3 2", "1 65", "1.5 2", "1", "1 2 3"}) {
     CHECK(error_of("ressort flight 1\nshare " + share + "\n") ==
           "2: invalid line in a flight: 'share " + share + "'");
