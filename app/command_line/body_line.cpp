@@ -130,19 +130,6 @@ void add_statistics(CLI::App& command, BodyStatistics& statistics) {
       ->needs(density);
 }
 
-// Returns an option that a statistical body cannot use, or null. Help stays short without CLI11's
-// list of exclusions at each option.
-CLI::Option* unused_by_statistics(CLI::App& command) {
-  for (CLI::Option* option : command.get_options()) {
-    const std::string group = option->get_group();
-    if (option->count() > 0 && (group == "Recording" || group == "Solid" || group == "Model" ||
-                                option->check_name("FILE") || option->check_name("--picture"))) {
-      return option;
-    }
-  }
-  return nullptr;
-}
-
 // Returns the given options that only some inputs use, with the input of their group.
 auto particular_options(const CLI::App& command) {
   std::vector<std::pair<std::string, std::string>> given;
@@ -169,8 +156,8 @@ void add_body(CLI::App& app, int& code) {
     if (!is_statistical && chosen.input.empty()) {
       throw CLI::RequiredError("FILE or --statistical");
     }
-    if (CLI::Option* unused = is_statistical ? unused_by_statistics(*command) : nullptr) {
-      throw CLI::ExcludesError(unused->get_name(), "--statistical");
+    if (is_statistical && !chosen.input.empty()) {
+      throw CLI::ExcludesError("FILE", "--statistical");
     }
     BodyRequest request = chosen;
     request.particular = particular_options(*command);

@@ -86,7 +86,9 @@ expect 0 "--mode 250,35,2,1,-1" cat box.mdl
 expect 0 "stable" "$program" check box.mdl
 expect 2 "box.mdl" "$program" body --statistical 100:0.05,900:0.01 --loss 0.02 -o box.mdl
 expect 2 "FILE or --statistical is required" "$program" body
-expect 2 "--floor excludes --statistical" "$program" body --statistical 9:1,90:1 --loss 1 --floor -9
+expect 2 "FILE excludes --statistical" "$program" body --statistical 9:1,90:1 --loss 1 box.mdl
+expect 0 "--floor has no effect on statistics" "$program" body --statistical 9:1,90:1 --loss 1 \
+  --floor -9
 expect 2 "--seed requires --statistical" "$program" body blow.flac --seed 2
 expect 2 "at least two points HZ:DENSITY" "$program" body --statistical 0.05 --loss 0.02
 expect 2 "only a recording becomes a preset" "$program" body --statistical 100:0.05,900:0.01 \

@@ -39,7 +39,8 @@ std::string_view likely_kind(std::string_view bytes) {
 int check_options(const BodyRequest& request, std::string_view kind, std::string_view used) {
   for (const auto& [name, group] : request.particular) {
     if (group != kind && used.find(name) == std::string_view::npos) {
-      print_error(name + " has no effect on a " + std::string(kind));
+      print_error(name + " has no effect on " + (kind == "statistics" ? "" : "a ") +
+                  std::string(kind));
     }
   }
   if (kind != "recording" && request.output.ends_with(".toml")) {
