@@ -70,7 +70,7 @@ struct Alsa {
   std::string device;
   Stream out;
   std::unique_ptr<Capture> in;  // opened when a model needs audio inputs; stays open
-  Published<Capture> captured;
+  Published<Capture*> captured;
   bool is_timed = false;       // the device accepts any amount at once: this thread keeps the time
   std::vector<float> samples;  // [channel][frame]
   std::vector<float*> outputs;

@@ -34,8 +34,8 @@ struct Jack {
   std::vector<jack_port_t*> outputs;
   jack_port_t* midi = nullptr;
   jack_port_t* midi_out = nullptr;  // null: no controller wants messages
-  std::array<Published<jack_port_t>, most_audio_inputs> inputs;  // registered when needed
-  std::int64_t clock_offset_ns = 0;                              // monotonic clock minus JACK's
+  std::array<Published<jack_port_t*>, most_audio_inputs> inputs;  // registered when needed
+  std::int64_t clock_offset_ns = 0;                               // monotonic clock minus JACK's
   double rate_hz = 48000.0;
   Flag lost;
   Flag rewired;  // ports or connections have changed since the last update_wiring()
@@ -242,7 +242,7 @@ void describe(Jack& jack, jack_port_t* port, const std::string& name, const char
 // model.
 void set_audio_inputs(Jack& jack, int wanted) {
   for (int i = 0; i < std::min(wanted, most_audio_inputs); ++i) {
-    Published<jack_port_t>& input = jack.inputs[static_cast<std::size_t>(i)];
+    Published<jack_port_t*>& input = jack.inputs[static_cast<std::size_t>(i)];
     if (input.get() == nullptr) {
       input.set(jack_port_register(jack.client, ("in_" + std::to_string(i + 1)).c_str(),
                                    JACK_DEFAULT_AUDIO_TYPE, JackPortIsInput, 0));

@@ -232,25 +232,16 @@ class HazardPointer {
   std::vector<User> users_;
 };
 
-// A time of the monotonic clock in ns, written by one thread and read by others.
-class AtomicTime {
- public:
-  void set(std::int64_t time_ns) { time_ns_.store(time_ns, std::memory_order_relaxed); }
-  std::int64_t get() const { return time_ns_.load(std::memory_order_relaxed); }
-
- private:
-  std::atomic<std::int64_t> time_ns_{0};
-};
-
-// A pointer that one thread sets and the audio thread reads. The object outlives both.
+// A number, or a pointer to an object that outlives both threads, that one thread sets and others
+// read.
 template <class T>
 class Published {
  public:
-  void set(T* value) { value_.store(value, std::memory_order_release); }
-  T* get() const { return value_.load(std::memory_order_acquire); }
+  void set(T value) { value_.store(value, std::memory_order_release); }
+  T get() const { return value_.load(std::memory_order_acquire); }
 
  private:
-  std::atomic<T*> value_{nullptr};
+  std::atomic<T> value_{};
 };
 
 // A triple buffer: the newest value of one writer for one reader, without waiting or copying. One

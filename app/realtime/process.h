@@ -181,7 +181,7 @@ struct Process {
   Flag is_recording;
   Ring<RecordedChunk> listening{1024};  // read by the timbre analysis
   Flag is_listening;
-  Published<const SampleTape> tape;  // replaces the output of the engines
+  Published<const SampleTape*> tape;  // replaces the output of the engines
   Flag is_tape_over;
   Ring<FlightRecord> flight{1 << 14};  // read by the session's worker
   Flag keeps_flight;

@@ -30,8 +30,8 @@ class ThreadPool final : public Executor {
 
   const SeqLock<ClockReading>* const clock_;
   HazardPointer<Team> shown_;
-  AtomicTime next_ns_;    // start of the next period that needs help
-  AtomicTime period_ns_;  // 0: unknown
+  Published<std::int64_t> next_ns_;    // start of the next period that needs help
+  Published<std::int64_t> period_ns_;  // 0: unknown
   // frame of the newest period; only the thread that shows a team uses it
   std::int64_t frame_ = -1;
   Flag ends_;
