@@ -229,9 +229,6 @@ std::uint32_t little_endian(std::string_view bytes) {
 
 Result<Surface> read_binary_stl(std::string_view bytes) {
   const std::size_t count = little_endian(bytes.substr(80));
-  if (count > max_triangles) {
-    return too_many();
-  }
   Surface surface;
   surface.points.reserve(3 * count);
   surface.triangles.reserve(count);
@@ -288,33 +285,24 @@ std::optional<Error> check_counts(const Words& words, std::optional<double> poin
   return *points > most || *faces > most ? std::optional(too_many()) : std::nullopt;
 }
 
-}  // namespace
+// Returns the number of bytes that the triangles of a binary STL need, or 0 if this cannot be one.
+std::size_t binary_stl_bytes(std::string_view bytes) {
+  const std::size_t count = bytes.size() >= stl_header_bytes ? little_endian(bytes.substr(80)) : 0;
+  const std::size_t size = stl_header_bytes + stl_triangle_bytes * count;
+  return count > 0 && count <= max_triangles && bytes.size() >= size ? size : 0;
+}
 
 Result<Surface> read_stl(std::string_view bytes) {
-  const bool may_be_binary = bytes.size() >= stl_header_bytes;
-  const std::size_t count = may_be_binary ? little_endian(bytes.substr(80)) : 0;
-  const std::size_t size = stl_header_bytes + stl_triangle_bytes * count;
-  const bool is_text = is_text_of(bytes) && is_word(Words(bytes).first(), "solid");
   // A binary file may begin with "solid", and some have bytes behind the triangles.
-  if (may_be_binary && count > 0 && (bytes.size() == size || (bytes.size() > size && !is_text))) {
-    auto surface = read_binary_stl(bytes);
-    if (surface) {
-      surface->ignored_bytes = bytes.size() - size;
-    }
-    return surface;
-  }
-  if (is_text) {
+  const std::size_t size = binary_stl_bytes(bytes);
+  if (size == 0 || (bytes.size() > size && is_text_of(bytes))) {
     return read_ascii_stl(bytes);
   }
-  if (may_be_binary && count > 0) {
-    return Error{"expected 'solid' at the beginning, or " + std::to_string(size) + " bytes for " +
-                 std::to_string(count) + " triangles of a binary STL, found " +
-                 std::to_string(bytes.size()) + " bytes"};
+  auto surface = read_binary_stl(bytes);
+  if (surface) {
+    surface->ignored_bytes = bytes.size() - size;
   }
-  return Error{may_be_binary && bytes.size() == size
-                   ? "it has no triangles"
-                   : "expected an STL: 'solid' at the beginning, or 84 bytes and 50 for "
-                     "each triangle"};
+  return surface;
 }
 
 Result<Surface> read_obj(std::string_view text) {
@@ -396,8 +384,6 @@ Result<Surface> read_off(std::string_view text) {
   return surface;
 }
 
-namespace {
-
 // A property of a PLY element: a number, or a list with its length before it.
 struct PlyProperty {
   std::string_view name;
@@ -456,8 +442,6 @@ class PlyNumbers {
   bool is_text_;
   bool is_big_;
 };
-
-}  // namespace
 
 Result<Surface> read_ply(std::string_view bytes) {
   Words words(bytes);
@@ -536,6 +520,8 @@ Result<Surface> read_ply(std::string_view bytes) {
   return surface;
 }
 
+}  // namespace
+
 SurfaceFormat surface_format(std::string_view bytes) {
   Words words(without_mark(bytes));
   const std::string_view first = words.first();
@@ -559,11 +545,7 @@ SurfaceFormat surface_format(std::string_view bytes) {
     }
     return SurfaceFormat::unknown;
   }
-  const std::size_t count = bytes.size() >= stl_header_bytes ? little_endian(bytes.substr(80)) : 0;
-  return count > 0 && count <= max_triangles &&
-                 bytes.size() >= stl_header_bytes + stl_triangle_bytes * count
-             ? SurfaceFormat::stl
-             : SurfaceFormat::unknown;
+  return binary_stl_bytes(bytes) > 0 ? SurfaceFormat::stl : SurfaceFormat::unknown;
 }
 
 Result<Surface> read_surface(std::string_view bytes) {

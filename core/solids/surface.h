@@ -48,19 +48,13 @@ struct Surface {
 inline constexpr std::size_t max_triangles = 2'000'000;  // Files with more triangles are rejected.
 inline constexpr double largest_coordinate = 1e9;        // Unit of the file.
 
-// Read the triangles of a file. STL may be ASCII or binary. Of OBJ files `v` and `f` are read, and
-// faces with more than three corners are triangulated. Errors give the line of a text, or the byte,
-// and what was expected there. O(bytes)
-Result<Surface> read_stl(std::string_view bytes);
-Result<Surface> read_obj(std::string_view text);
-Result<Surface> read_ply(std::string_view bytes);  // text or binary
-Result<Surface> read_off(std::string_view text);
-
 // Returns the format of a file by its content.
 enum class SurfaceFormat { unknown, stl, obj, ply, off };
 SurfaceFormat surface_format(std::string_view bytes);
 
-// Reads a file in any of these formats. Ignores a byte-order mark.
+// Reads the triangles of a file. STL and PLY may be text or binary. Of OBJ files `v` and `f` are
+// read, and faces with more than three corners are triangulated. Ignores a byte-order mark. Errors
+// give the line of a text, or the byte, and what was expected there. O(bytes)
 Result<Surface> read_surface(std::string_view bytes);
 
 // The changes that made a surface usable.
