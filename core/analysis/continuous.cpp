@@ -4,9 +4,9 @@
 #include <cmath>
 #include <utility>
 
-#include "core/analysis/linear.h"
+#include "core/analysis/modes/linear_system.h"
+#include "core/analysis/modes/quadratic.h"
 #include "core/analysis/places.h"
-#include "core/laws/law.h"
 #include "core/linear_algebra/eigen.h"
 #include "core/model/topology.h"
 
@@ -15,196 +15,116 @@ namespace {
 
 using Complex = std::complex<double>;
 
-// Largest off-diagonal element of Z in the modes of K, relative to the largest element.
-constexpr double shared_tolerance = 1e-9;
 // A stiffness or damping below this share of the largest counts as 0.
 constexpr double zero = 1e-13;
 
-// A spring and damper between two weighted sums of masses; its force is k (sum of share x -
-// offset).
-struct Bar {
-  std::vector<std::pair<std::size_t, double>> shares;
-  double offset = 0.0;
-  double k = 0.0;
-  double z = 0.0;
-};
-
-// The network for unit masses: row i is mass i times the square root of its M.
-class ContinuousBody {
+// Solves a network whose arguments are numbers. Rows are those of its linear system.
+class Solver {
  public:
-  ContinuousBody(const Network& network, std::span<const double> parameters)
-      : network_(network), parameters_(parameters), row_(network.masses.size(), held) {
-    for (std::size_t i = 0; i < network.masses.size(); ++i) {
-      if (moves(network.masses[i])) {
-        row_[i] = root_.size();
-        root_.push_back(std::sqrt(value(network.masses[i].mass)));
+  Solver(const Network& network, const LinearSystem& system)
+      : network_(network),
+        system_(system),
+        x_(system.size()),
+        v_(system.size()),
+        force_(system.size()) {
+    std::vector<std::size_t> row(network.masses.size());
+    for (std::size_t i = 0; i < system.size(); ++i) {
+      const Mass& mass = network.masses[system.masses[i]];
+      const double root = system.root[i];
+      row[system.masses[i]] = i;
+      x_[i] = root * mass.position;
+      v_[i] = root * initial_velocity(network, mass);
+      if (mass.gravity != no_argument) {
+        force_[i] = -argument_value(network, mass.gravity, {}) /
+                    (mass.gravity_per_rate ? Network::reference_rate_hz : 1.0) / root;
       }
     }
-    force_.resize(size());
-    for (std::uint32_t i = 0; i < network.masses.size(); ++i) {
-      const Mass& mass = network.masses[i];
-      if (mass.kind == MassKind::oscillator) {
-        Bar bar{.k = value(mass.stiffness), .z = value(mass.damping)};
-        hang(bar, i, 1.0);
-        bars_.push_back(bar);
-      }
-      if (mass.gravity != no_argument && row_[i] != held) {
-        force_[row_[i]] -= value(mass.gravity) /
-                           (mass.gravity_per_rate ? Network::reference_rate_hz : 1.0) /
-                           root_[row_[i]];
-      }
-    }
-    for (const Link& link : network.links) {
-      const LinearPart part = linear_part(link);
-      Bar bar{.k = value(part.stiffness), .z = value(part.damping)};
-      hang(bar, link.a, 1.0);
-      hang(bar, link.b, -1.0);
-      bars_.push_back(bar);
-    }
-    for (const Bar& bar : bars_) {
-      for (const auto& [row, share] : bar.shares) {
-        force_[row] += bar.k * bar.offset * share;
-      }
-    }
-  }
-
-  std::size_t size() const { return root_.size(); }
-  bool has_mass() const {
-    return !root_.empty() && std::ranges::all_of(root_, [](double root) {
-      return root > 0.0 && std::isfinite(root);
-    });
-  }
-  const Vector& force() const { return force_; }
-
-  Matrix matrix(double Bar::*of) const {
-    Matrix sum(size(), size());
-    for (const Bar& bar : bars_) {
-      for (const auto& [i, a] : bar.shares) {
-        for (const auto& [j, b] : bar.shares) {
-          sum(i, j) += bar.*of * a * b;
+    for (const ModalSpring& spring : system.springs) {
+      if (spring.is_link) {
+        const Link& link = network.links[spring.element];
+        const double pull = spring.stiffness * (held(link.b) - held(link.a));
+        for (const auto& [i, share] : system.of(spring)) {
+          force_[i] += pull * share;
         }
       }
     }
-    return sum;
-  }
-
-  // Returns the stiffness or damping of a shape as a sum of squares, which is accurate for small
-  // values, too.
-  double along(double Bar::*of, const Vector& shape) const {
-    double sum = 0.0;
-    for (const Bar& bar : bars_) {
-      double stretch = 0.0;
-      for (const auto& [row, share] : bar.shares) {
-        stretch += share * shape[row];
-      }
-      sum += bar.*of * stretch * stretch;
-    }
-    return sum;
-  }
-
-  std::pair<Vector, Vector> start() const {
-    Vector x(size());
-    Vector v(size());
-    for (std::size_t i = 0; i < row_.size(); ++i) {
-      if (row_[i] != held) {
-        const double root = root_[row_[i]];
-        x[row_[i]] = root * network_.masses[i].position;
-        v[row_[i]] = root * initial_velocity(network_, network_.masses[i]);
-      }
-    }
-    return {x, v};
-  }
-
-  // Returns the value of an output as a weighted sum of rows and a constant.
-  Bar reading(const Output& output) const {
-    Bar bar;
-    hang(bar, output.mass, level_value(network_, output, parameters_));
-    return bar;
-  }
-
- private:
-  static constexpr std::size_t held = static_cast<std::size_t>(-1);
-
-  double value(ArgumentId id) const { return argument_value(network_, id, parameters_); }
-
-  void hang(Bar& bar, std::uint32_t mass, double sign) const {
-    each_share(network_, mass, [&](std::uint32_t i, double share) {
-      if (row_[i] == held) {
-        bar.offset -= sign * share * network_.masses[i].position;
-      } else {
-        bar.shares.emplace_back(row_[i], sign * share / root_[row_[i]]);
-      }
-    });
-  }
-
-  const Network& network_;
-  std::span<const double> parameters_;
-  std::vector<std::size_t> row_;  // [mass]
-  std::vector<double> root_;      // [row] Square root of its M.
-  std::vector<Bar> bars_;
-  Vector force_;  // [row] Force with every mass at 0.
-};
-
-class Solver {
- public:
-  Solver(const Network& network, const ContinuousBody& body) : body_(body) {
     for (const Output& output : network.outputs) {
-      reading_.push_back(body.reading(output));
-      outputs_.push_back({.rest = -reading_.back().offset});
+      const double level = level_value(network, output, {});
+      outputs_.push_back({.rest = level * held(output.mass)});
+      auto& shares = readings_.emplace_back();
+      each_share(network, output.mass, [&](std::uint32_t mass, double share) {
+        if (moves(network.masses[mass])) {
+          shares.emplace_back(row[mass], level * share / system.root[row[mass]]);
+        }
+      });
     }
-    std::tie(x_, v_) = body.start();
   }
 
   std::optional<std::vector<ContinuousOutput>> solve() {
-    const Matrix k = body_.matrix(&Bar::k);
-    const Matrix z = body_.matrix(&Bar::z);
-    const double k_scale = std::max(largest(k.values), 1e-300);
-    const double z_scale = std::max(largest(z.values), 1e-300);
-    // Diagonalises a combination with an irrational ratio, because Z can separate modes that are
-    // degenerate in K.
-    Matrix mixture = k;
-    mixture.values = k.values / k_scale + 0.6180339887498949 / z_scale * z.values;
-    const Matrix shapes = symmetric_eigenpairs(mixture).vectors;
-    const auto is_diagonal = [&](const Matrix& matrix, double scale) {
-      Matrix rest = in_basis(matrix, shapes);
-      for (std::size_t j = 0; j < rest.rows(); ++j) {
-        rest(j, j) = 0.0;
-      }
-      return largest(rest.values) <= shared_tolerance * scale;
-    };
-    if (is_diagonal(k, k_scale) && is_diagonal(z, z_scale)) {
-      for (std::size_t j = 0; j < shapes.columns(); ++j) {
-        add_mode(shapes.column(j), k_scale, z_scale);
-      }
-    } else if (body_.size() > most_crossed_modes || !add_crossed_modes(k, z)) {
+    const Matrix k = dense(system_.stiffness());
+    const Matrix z = dense(system_.damping());
+    const double stiffest = std::max(largest(k.values), 1e-300);
+    const double most_damped = std::max(largest(z.values), 1e-300);
+    const auto swings = swings_of(k, z, 0.0, zero * stiffest, system_.size() <= most_crossed_modes);
+    if (!swings) {
+      return std::nullopt;
+    }
+    for (std::size_t j = 0; j < swings->basis.columns(); ++j) {
+      add_mode(swings->basis.column(j), zero * stiffest, zero * most_damped);
+    }
+    if (!swings->is_proportional && !add_swings(swings->all, k, z)) {
       return std::nullopt;
     }
     return std::move(outputs_);
   }
 
  private:
-  double read(std::size_t output, const Vector& shape) const {
+  // Returns the part of a position that masses which do not move contribute.
+  double held(std::uint32_t mass) const {
     double sum = 0.0;
-    for (const auto& [row, share] : reading_[output].shares) {
+    each_share(network_, mass, [&](std::uint32_t i, double share) {
+      sum += moves(network_.masses[i]) ? 0.0 : share * network_.masses[i].position;
+    });
+    return sum;
+  }
+
+  // Returns the stiffness or damping of a shape as a sum of squares, which is accurate for small
+  // values, too.
+  double along(double ModalSpring::*of, const Vector& shape) const {
+    double sum = 0.0;
+    for (const ModalSpring& spring : system_.springs) {
+      double stretch = 0.0;
+      for (const auto& [row, share] : system_.of(spring)) {
+        stretch += share * shape[row];
+      }
+      sum += spring.*of * stretch * stretch;
+    }
+    return sum;
+  }
+
+  template <class Shape>
+  auto read(std::size_t output, const Shape& shape) const {
+    auto sum = 0.0 * shape[0];
+    for (const auto& [row, share] : readings_[output]) {
       sum += share * shape[row];
     }
     return sum;
   }
 
   // Solves q'' + damping q' + stiffness q = force for an independent mode.
-  void add_mode(const Vector& shape, double k_scale, double z_scale) {
-    double stiffness = body_.along(&Bar::k, shape);
-    double damping = body_.along(&Bar::z, shape);
-    stiffness = stiffness < zero * k_scale ? 0.0 : stiffness;
-    damping = damping < zero * z_scale ? 0.0 : damping;
-    const double force = dot(shape, body_.force());
+  void add_mode(const Vector& shape, double least_stiffness, double least_damping) {
+    double stiffness = along(&ModalSpring::stiffness, shape);
+    double damping = along(&ModalSpring::damping, shape);
+    stiffness = stiffness < least_stiffness ? 0.0 : stiffness;
+    damping = damping < least_damping ? 0.0 : damping;
+    const double force = dot(shape, force_);
     const double q = dot(shape, x_);
     const double v = dot(shape, v_);
     if (stiffness == 0.0) {
       return add_free(shape, damping, force, q, v);
     }
     const double still = force / stiffness;
-    for (std::size_t o = 0; o < reading_.size(); ++o) {
+    for (std::size_t o = 0; o < readings_.size(); ++o) {
       outputs_[o].rest += read(o, shape) * still;
     }
     double inner = stiffness - 0.25 * damping * damping;
@@ -224,7 +144,7 @@ class Solver {
   }
 
   void add_free(const Vector& shape, double damping, double force, double q, double v) {
-    for (std::size_t o = 0; o < reading_.size(); ++o) {
+    for (std::size_t o = 0; o < readings_.size(); ++o) {
       ContinuousOutput& output = outputs_[o];
       const double share = read(o, shape);
       if (damping == 0.0) {
@@ -241,59 +161,45 @@ class Solver {
   }
 
   void add_terms(const Vector& shape, const std::vector<ContinuousOutput::Term>& terms) {
-    for (std::size_t o = 0; o < reading_.size(); ++o) {
+    for (std::size_t o = 0; o < readings_.size(); ++o) {
       for (const ContinuousOutput::Term& term : terms) {
         outputs_[o].terms.push_back({read(o, shape) * term.amplitude, term.pole});
       }
     }
   }
 
-  // Uses the eigenvectors of the first-order system (x, v)' = (v, f - K x - Z v).
-  bool add_crossed_modes(const Matrix& k, const Matrix& z) {
-    const std::size_t n = body_.size();
-    Matrix flow(2 * n, 2 * n);
-    for (std::size_t j = 0; j < n; ++j) {
-      flow(j, n + j) = 1.0;
-      for (std::size_t i = 0; i < n; ++i) {
-        flow(n + i, j) = -k(i, j);
-        flow(n + i, n + j) = -z(i, j);
-      }
-    }
-    const std::optional<Vector> still = solution(k, body_.force());
-    if (!still) {
+  // Adds the modes of non-proportional damping. Returns false if some motions do not oscillate.
+  bool add_swings(const std::vector<Swing>& swings, const Matrix& k, const Matrix& z) {
+    const std::optional<Vector> still = solution(k, force_);
+    if (!still || swings.size() != system_.size()) {
       return false;
     }
-    Vector state(2 * n);
-    state[std::slice(0, n, 1)] = x_ - *still;
-    state[std::slice(n, n, 1)] = v_;
-    const std::optional<ComplexEigenpairs> pairs = eigenpairs_of_state(flow, state);
-    if (!pairs) {
-      return false;
+    const Vector x = x_ - *still;
+    Vector rubbed(x.size());
+    for (std::size_t j = 0; j < x.size(); ++j) {
+      rubbed += x[j] * z.column(j);
     }
-    for (std::size_t o = 0; o < reading_.size(); ++o) {
+    for (std::size_t o = 0; o < readings_.size(); ++o) {
       outputs_[o].rest += read(o, *still);
     }
-    for (std::size_t j = 0; j < 2 * n; ++j) {
-      const Complex pole = pairs->values[j];
-      if (pole.imag() < 0.0) {
-        continue;  // Included with its conjugate.
+    for (const auto& [mu, shape] : swings) {
+      Complex start;
+      for (std::size_t i = 0; i < x.size(); ++i) {
+        start += shape[i] * (mu * x[i] + rubbed[i] + v_[i]);
       }
-      const std::complex<double> share = pairs->shares[j] * (pole.imag() > 0.0 ? 2.0 : 1.0);
-      for (std::size_t o = 0; o < reading_.size(); ++o) {
-        Complex amplitude = 0.0;
-        for (const auto& [row, part] : reading_[o].shares) {
-          amplitude += part * pairs->vectors[j][row] * share;
-        }
-        outputs_[o].terms.push_back({amplitude, pole});
+      for (std::size_t o = 0; o < readings_.size(); ++o) {
+        outputs_[o].terms.push_back({read(o, shape) * start / Complex(0.0, mu.imag()), mu});
       }
     }
     return true;
   }
 
-  const ContinuousBody& body_;
-  std::vector<Bar> reading_;  // [output]
-  Vector x_;                  // [row] Position at the start.
-  Vector v_;
+  const Network& network_;
+  const LinearSystem& system_;
+  std::vector<std::vector<std::pair<std::size_t, double>>> readings_;  // [output] Row and weight.
+  Vector x_;      // [row] Position at the start.
+  Vector v_;      // [row]
+  Vector force_;  // [row] Force with every mass at 0.
   std::vector<ContinuousOutput> outputs_;
 };
 
@@ -322,17 +228,16 @@ std::vector<double> ContinuousOutput::play(std::size_t frames, double step) cons
 
 std::optional<std::vector<ContinuousOutput>> solve_continuous(const Network& network,
                                                               std::span<const double> parameters) {
-  if (!network.macros.empty()) {
-    return solve_continuous(expand_macros(network), parameters);
-  }
-  const ContinuousBody body(network, parameters);
-  if (!is_linear(network) || !body.has_mass() || body.size() > most_exact_modes ||
-      std::ranges::any_of(network.outputs, [](const Output& output) {
+  const Network whole = evaluated(expand_macros(network), parameters);
+  const LinearSystem system = make_linear_system(whole, 1.0, false);
+  if (!whole.waveguides.empty() || !system.is_linear || !system.is_sound || system.size() == 0 ||
+      system.size() > most_exact_modes ||
+      std::ranges::any_of(whole.outputs, [](const Output& output) {
         return output.is_force || output.derivative > 0;
       })) {
     return std::nullopt;
   }
-  return Solver(network, body).solve();
+  return Solver(whole, system).solve();
 }
 
 }  // namespace ressort::analysis

@@ -33,8 +33,8 @@ inline constexpr std::size_t most_crossed_modes = 400;  // The same for non-prop
 
 // Solves a linear network without parameters at audio rate, with its inputs held at their start.
 // Returns [output of the network]; empty if it has too many masses, if a mass is not above 0, or if
-// its modes do not span all motions (non-proportional and exactly critical damping). O(masses^3).
-// [any thread but audio]
+// its damping is not proportional and some motions do not oscillate. O(masses^3). [any thread but
+// audio]
 std::optional<std::vector<ContinuousOutput>> solve_continuous(const Network& network,
                                                               std::span<const double> parameters);
 
