@@ -13,33 +13,6 @@ Map map_of(const ComplexMatrix& matrix) {
   return {matrix.values.data(), static_cast<Eigen::Index>(matrix.rows),
           static_cast<Eigen::Index>(matrix.columns)};
 }
-Eigen::Map<const Eigen::MatrixXd> map_of(const Matrix& matrix) {
-  return {std::begin(matrix.values), static_cast<Eigen::Index>(matrix.rows()),
-          static_cast<Eigen::Index>(matrix.columns())};
-}
-
-Matrix matrix_of(const Eigen::MatrixXd& given) {
-  Matrix matrix(static_cast<std::size_t>(given.rows()), static_cast<std::size_t>(given.cols()));
-  std::copy_n(given.data(), given.size(), std::begin(matrix.values));
-  return matrix;
-}
-
-// The Cholesky factor of a matrix that is scaled to a unit diagonal.
-struct Factor {
-  static std::optional<Factor> of(const Matrix& a) {
-    const auto given = map_of(a);
-    if (given.size() > 0 && !(given.diagonal().minCoeff() > 0.0)) {
-      return std::nullopt;
-    }
-    Factor factor{given.diagonal().cwiseSqrt().cwiseInverse(), {}};
-    factor.lower.compute(factor.scale.asDiagonal() * given * factor.scale.asDiagonal());
-    return factor.lower.info() == Eigen::Success ? std::optional(factor) : std::nullopt;
-  }
-
-  Eigen::VectorXd scale;
-  Eigen::LLT<Eigen::MatrixXd> lower;
-};
-
 }  // namespace
 
 HermitianEigenpairs hermitian_eigenpairs(const ComplexMatrix& matrix, std::size_t most) {
@@ -68,26 +41,6 @@ std::vector<std::complex<double>> shift_eigenvalues(const ComplexMatrix& basis) 
   return {solver.eigenvalues().begin(), solver.eigenvalues().end()};
 }
 
-std::optional<Matrix> positive_solution(const Matrix& a, const Matrix& b) {
-  const std::optional<Factor> factor = Factor::of(a);
-  return factor
-             ? std::optional(matrix_of(factor->scale.asDiagonal() *
-                                       factor->lower.solve(factor->scale.asDiagonal() * map_of(b))))
-             : std::nullopt;
-}
-
-std::optional<Matrix> positive_form(const Matrix& a, const Matrix& b) {
-  const std::optional<Factor> factor = Factor::of(a);
-  if (!factor) {
-    return std::nullopt;
-  }
-  Eigen::MatrixXd half = factor->scale.asDiagonal() * map_of(b);
-  factor->lower.matrixL().solveInPlace(half);
-  Eigen::MatrixXd form = Eigen::MatrixXd::Zero(half.cols(), half.cols());
-  form.selfadjointView<Eigen::Lower>().rankUpdate(half.transpose());
-  return matrix_of(form.selfadjointView<Eigen::Lower>());
-}
-
 std::complex<double> schur_complement_of_first(ComplexMatrix matrix) {
   for (std::size_t last = matrix.rows; last-- > 1;) {
     std::size_t pivot = last;
@@ -105,10 +58,6 @@ std::complex<double> schur_complement_of_first(ComplexMatrix matrix) {
     }
   }
   return matrix(0, 0);
-}
-
-Matrix transposed_product(const Matrix& a, const Matrix& b) {
-  return matrix_of(map_of(a).transpose() * map_of(b));
 }
 
 }  // namespace ressort::linear_algebra

@@ -41,19 +41,9 @@ HermitianEigenpairs hermitian_eigenpairs(const ComplexMatrix& matrix, std::size_
 // found. O(rows columns^2)
 std::vector<std::complex<double>> shift_eigenvalues(const ComplexMatrix& basis);
 
-// Solves A X = B for a symmetric positive definite A, whose lower half is read. A is first scaled
-// to a unit diagonal. Empty if A is not positive definite. O(size^3)
-std::optional<Matrix> positive_solution(const Matrix& a, const Matrix& b);
-
-// Returns B^T A^-1 B likewise, in about half the time.
-std::optional<Matrix> positive_form(const Matrix& a, const Matrix& b);
-
 // Returns the Schur complement of the first row and column: the scalar that remains after all
 // others are eliminated. It is 0 if the matrix is singular with a null vector that involves the
 // first row. O(size^3)
 std::complex<double> schur_complement_of_first(ComplexMatrix matrix);
-
-// Returns A^T B.
-Matrix transposed_product(const Matrix& a, const Matrix& b);
 
 }  // namespace ressort::linear_algebra

@@ -32,17 +32,11 @@ std::vector<std::complex<double>> eigenvalues(const Matrix& matrix);
 struct ComplexEigenpairs {
   ComplexVector values;  // Complex values come in conjugate pairs.
   std::vector<ComplexVector> vectors;
-  // [pair] Coefficients of the given state in this basis, if a state was given.
-  ComplexVector shares;
 };
 
 // Returns the eigenpairs of a square matrix, vectors of length 1; empty if they cannot be found.
 // O(size^3)
 std::optional<ComplexEigenpairs> eigenpairs(const Matrix& matrix);
-
-// Returns the eigenpairs and the coefficients of `state` in the basis of the vectors; empty if the
-// vectors do not span it to 1e-9. O(size^3)
-std::optional<ComplexEigenpairs> eigenpairs_of_state(const Matrix& matrix, const Vector& state);
 
 // Returns A B.
 Matrix product(const Matrix& a, const Matrix& b);
@@ -56,5 +50,15 @@ std::optional<Vector> solution(const Matrix& matrix, const Vector& b);
 
 // Solves X A = B; empty if A is singular.
 std::optional<Matrix> quotient(const Matrix& b, const Matrix& a);
+
+// Solves A X = B for a symmetric positive definite A, whose lower half is read. A is first scaled
+// to a unit diagonal. Empty if A is not positive definite. O(size^3)
+std::optional<Matrix> positive_solution(const Matrix& a, const Matrix& b);
+
+// Returns B^T A^-1 B likewise, in about half the time.
+std::optional<Matrix> positive_form(const Matrix& a, const Matrix& b);
+
+// Returns A^T B.
+Matrix transposed_product(const Matrix& a, const Matrix& b);
 
 }  // namespace ressort::linear_algebra

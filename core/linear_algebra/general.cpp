@@ -1,3 +1,4 @@
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <algorithm>
@@ -23,6 +24,22 @@ Matrix matrix_of(const Eigen::MatrixXd& given) {
   return matrix;
 }
 
+// The Cholesky factor of a matrix that is scaled to a unit diagonal.
+struct Factor {
+  static std::optional<Factor> of(const Matrix& a) {
+    const auto given = map_of(a);
+    if (given.size() > 0 && !(given.diagonal().minCoeff() > 0.0)) {
+      return std::nullopt;
+    }
+    Factor factor{given.diagonal().cwiseSqrt().cwiseInverse(), {}};
+    factor.lower.compute(factor.scale.asDiagonal() * given * factor.scale.asDiagonal());
+    return factor.lower.info() == Eigen::Success ? std::optional(factor) : std::nullopt;
+  }
+
+  Eigen::VectorXd scale;
+  Eigen::LLT<Eigen::MatrixXd> lower;
+};
+
 }  // namespace
 
 std::vector<std::complex<double>> eigenvalues(const Matrix& matrix) {
@@ -40,41 +57,9 @@ std::optional<ComplexEigenpairs> eigenpairs(const Matrix& matrix) {
   }
   const Eigen::MatrixXcd vectors = solver.eigenvectors();
   const std::size_t size = matrix.rows();
-  ComplexEigenpairs pairs{ComplexVector(solver.eigenvalues().data(), size), {}, {}};
+  ComplexEigenpairs pairs{ComplexVector(solver.eigenvalues().data(), size), {}};
   for (std::size_t j = 0; j < size; ++j) {
     pairs.vectors.emplace_back(vectors.data() + j * size, size);
-  }
-  return pairs;
-}
-
-std::optional<ComplexEigenpairs> eigenpairs_of_state(const Matrix& matrix, const Vector& state) {
-  std::optional<ComplexEigenpairs> pairs = eigenpairs(matrix);
-  if (!pairs) {
-    return std::nullopt;
-  }
-  // A conjugate pair contributes through its real part and its imaginary part.
-  const std::size_t size = matrix.rows();
-  Matrix parts(size, size);
-  for (std::size_t j = 0; j < size; ++j) {
-    const bool is_second = pairs->values[j].imag() < 0.0;
-    for (std::size_t i = 0; i < size; ++i) {
-      const std::complex<double> number = pairs->vectors[j][i];
-      parts(i, j) = is_second ? -number.imag() : number.real();
-    }
-  }
-  const std::optional<Vector> shares = solution(parts, state);
-  if (!shares) {
-    return std::nullopt;
-  }
-  pairs->shares = ComplexVector(size);
-  for (std::size_t j = 0; j < size; ++j) {
-    if (pairs->values[j].imag() > 0.0) {
-      pairs->shares[j] = {(*shares)[j] / 2.0, -(*shares)[j + 1] / 2.0};
-      pairs->shares[j + 1] = std::conj(pairs->shares[j]);
-      ++j;
-    } else {
-      pairs->shares[j] = (*shares)[j];
-    }
   }
   return pairs;
 }
@@ -100,6 +85,30 @@ std::optional<Matrix> quotient(const Matrix& b, const Matrix& a) {
   return factor.isInvertible()
              ? std::optional(matrix_of(factor.solve(map_of(b).transpose()).transpose()))
              : std::nullopt;
+}
+
+std::optional<Matrix> positive_solution(const Matrix& a, const Matrix& b) {
+  const std::optional<Factor> factor = Factor::of(a);
+  return factor
+             ? std::optional(matrix_of(factor->scale.asDiagonal() *
+                                       factor->lower.solve(factor->scale.asDiagonal() * map_of(b))))
+             : std::nullopt;
+}
+
+std::optional<Matrix> positive_form(const Matrix& a, const Matrix& b) {
+  const std::optional<Factor> factor = Factor::of(a);
+  if (!factor) {
+    return std::nullopt;
+  }
+  Eigen::MatrixXd half = factor->scale.asDiagonal() * map_of(b);
+  factor->lower.matrixL().solveInPlace(half);
+  Eigen::MatrixXd form = Eigen::MatrixXd::Zero(half.cols(), half.cols());
+  form.selfadjointView<Eigen::Lower>().rankUpdate(half.transpose());
+  return matrix_of(form.selfadjointView<Eigen::Lower>());
+}
+
+Matrix transposed_product(const Matrix& a, const Matrix& b) {
+  return matrix_of(map_of(a).transpose() * map_of(b));
 }
 
 }  // namespace ressort::linear_algebra

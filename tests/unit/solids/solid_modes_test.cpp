@@ -4,7 +4,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/linear_algebra/complex.h"
 #include "core/linear_algebra/eigen.h"
 #include "tests/support/catch.h"
 #include "tests/support/random.h"
