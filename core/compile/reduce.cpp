@@ -60,7 +60,7 @@ class FormulaMaker {
 
   ArgumentId zero() {
     if (!zero_) {
-      zero_ = add({{Op::number, 0, 0.0}});
+      zero_ = network_.add(0.0);
     }
     return *zero_;
   }
@@ -77,18 +77,13 @@ class FormulaMaker {
       if (formula.size() + second.size() < most_sum_steps) {
         formula.insert(formula.end(), second.begin(), second.end());
         formula.push_back({Op::add, 0, 0.0});
-        entry->second = add(std::move(formula));
+        entry->second = network_.add(std::move(formula));
       }
     }
     return entry->second;
   }
 
  private:
-  ArgumentId add(Formula formula) {
-    network_.arguments.push_back(std::move(formula));
-    return static_cast<ArgumentId>(network_.arguments.size() - 1);
-  }
-
   Network& network_;
   std::optional<ArgumentId> zero_;
   std::map<std::pair<ArgumentId, ArgumentId>, std::optional<ArgumentId>> sums_;

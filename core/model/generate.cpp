@@ -242,15 +242,10 @@ class Builder {
 
   std::string label(const std::string& rest) const { return shape_.name + "_" + rest; }
 
-  ArgumentId argument(Formula formula) {
-    network_.arguments.push_back(std::move(formula));
-    return static_cast<ArgumentId>(network_.arguments.size() - 1);
-  }
-
   ArgumentId parameter(const std::string& name, double value) {
     const auto index = static_cast<std::uint32_t>(network_.parameters.size());
     network_.parameters.push_back({.name = label(name), .value = value});
-    return argument(Formula{Step{Op::parameter, index, 0.0}});
+    return network_.add(Formula{Step{Op::parameter, index, 0.0}});
   }
 
   void add(const Point& point) {
@@ -260,7 +255,7 @@ class Builder {
       mass.mass = mass_;
       if (air_ != no_argument) {
         mass.kind = MassKind::oscillator;
-        mass.stiffness = none_ == no_argument ? none_ = argument(Formula{Step{}}) : none_;
+        mass.stiffness = none_ == no_argument ? none_ = network_.add(Formula{Step{}}) : none_;
         mass.damping = air_;
       }
     }
@@ -292,9 +287,9 @@ class Builder {
   }
 
   std::uint32_t place(Spot spot) {
-    const ArgumentId u = argument(Formula{Step{Op::number, 0, spot.u}});
+    const ArgumentId u = network_.add(Formula{Step{Op::number, 0, spot.u}});
     const ArgumentId v =
-        has_width(shape_.kind) ? argument(Formula{Step{Op::number, 0, spot.v}}) : no_argument;
+        has_width(shape_.kind) ? network_.add(Formula{Step{Op::number, 0, spot.v}}) : no_argument;
     network_.masses.push_back(
         {.kind = MassKind::point, .tap = static_cast<std::uint32_t>(network_.taps.size())});
     network_.taps.push_back({.macro = 0, .u = u, .v = v});

@@ -381,8 +381,7 @@ class Morphing {
         (stack_depth(formula) > max_formula_depth || formula.size() > max_formula_steps)) {
       error_ = Error{"a formula of the model is too long for the morph"};
     }
-    out_.arguments.push_back(std::move(formula));
-    return static_cast<ArgumentId>(out_.arguments.size() - 1);
+    return out_.add(std::move(formula));
   }
 
   std::span<const MorphStop> stops_;

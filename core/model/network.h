@@ -232,6 +232,12 @@ struct Network {
   bool operator==(const Network&) const = default;
 
   static constexpr double reference_rate_hz = 44100.0;
+
+  ArgumentId add(Formula formula) {
+    arguments.push_back(std::move(formula));
+    return static_cast<ArgumentId>(arguments.size() - 1);
+  }
+  ArgumentId add(double number) { return add(Formula{{.op = Op::number, .value = number}}); }
 };
 
 // Returns the canonical form of a network, which is the same for equal networks. Masses come first

@@ -114,17 +114,13 @@ void add_modes(const Network& network, std::uint32_t body, const Progress& progr
   std::size_t at = 0;
   for (auto mode = of_body.first; mode != of_body.second; ++mode) {
     progress.spend(16);
-    const auto add = [&](Formula formula) {
-      expanded.arguments.push_back(std::move(formula));
-      return static_cast<ArgumentId>(expanded.arguments.size() - 1);
-    };
     const Formula& mass = network.arguments[macro.mass];
     const Formula& t60_s = network.arguments[mode->t60_s];
     expanded.masses.push_back({.kind = MassKind::oscillator,
                                .mass = macro.mass,
-                               .stiffness = add(mode_stiffness(
+                               .stiffness = expanded.add(mode_stiffness(
                                    mass, network.arguments[mode->frequency_hz], decay_rate(t60_s))),
-                               .damping = add(mode_damping(mass, t60_s)),
+                               .damping = expanded.add(mode_damping(mass, t60_s)),
                                .is_mode = true,
                                .is_fixed = macro.is_fixed,
                                .location = mode->location});
@@ -151,23 +147,24 @@ class StringModes {
     Formula mass = network_.arguments[string_.mass];
     append(mass, {{Op::number, 0, 0.5}, {Op::multiply}});
     mass = folded(std::move(mass));
-    const ArgumentId mass_id = add(mass);
+    const ArgumentId mass_id = expanded_.add(mass);
     for (std::uint32_t n = 1; n <= string_.length; ++n) {
       const Formula rate = rate_of(n);
       Formula damping = mass;
       append(damping, {{Op::number, 0, 2.0}, {Op::multiply}});
       append(damping, rate);
       append(damping, {{Op::multiply}});
-      const ArgumentId damping_id = add(folded(std::move(damping)));
+      const ArgumentId damping_id = expanded_.add(folded(std::move(damping)));
       for (std::uint32_t string = 0; string < string_.width; ++string) {
         progress.spend(16);
-        expanded_.masses.push_back({.kind = MassKind::oscillator,
-                                    .mass = mass_id,
-                                    .stiffness = add(mode_stiffness(mass, hz_of(n, string), rate)),
-                                    .damping = damping_id,
-                                    .is_mode = true,
-                                    .is_fixed = string_.is_fixed,
-                                    .location = string_.location});
+        expanded_.masses.push_back(
+            {.kind = MassKind::oscillator,
+             .mass = mass_id,
+             .stiffness = expanded_.add(mode_stiffness(mass, hz_of(n, string), rate)),
+             .damping = damping_id,
+             .is_mode = true,
+             .is_fixed = string_.is_fixed,
+             .location = string_.location});
       }
     }
     if (string_.bridge_loss != no_argument) {
@@ -198,11 +195,6 @@ class StringModes {
   }
 
  private:
-  ArgumentId add(Formula formula) {
-    expanded_.arguments.push_back(std::move(formula));
-    return static_cast<ArgumentId>(expanded_.arguments.size() - 1);
-  }
-
   static double sign_of(std::uint32_t partial) { return partial % 2 == 1 ? 1.0 : -1.0; }
 
   // Appends the same displacement for each string.
@@ -275,7 +267,7 @@ class StringModes {
     Link damper{.location = string_.location};
     damper.a = static_cast<std::uint32_t>(expanded_.masses.size());
     damper.b = damper.a + 1;
-    damper.arguments[1] = add(folded(std::move(damping)));
+    damper.arguments[1] = expanded_.add(folded(std::move(damping)));
     expanded_.masses.push_back(std::move(place));
     expanded_.masses.push_back(std::move(ground));
     expanded_.links.push_back(std::move(damper));

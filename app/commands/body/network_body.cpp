@@ -37,9 +37,7 @@ std::string listen_at(Network& network, const std::string& place) {
       continue;
     }
     const double last = static_cast<double>(std::max<std::size_t>(places.size(), 2) - 1);
-    const auto u = static_cast<ArgumentId>(network.arguments.size());
-    network.arguments.push_back(
-        {{Op::number, 0, static_cast<double>(found - places.begin()) / last}});
+    const ArgumentId u = network.add(static_cast<double>(found - places.begin()) / last);
     const auto mass = static_cast<std::uint32_t>(network.masses.size());
     network.masses.push_back(
         {.kind = MassKind::point, .tap = static_cast<std::uint32_t>(network.taps.size())});

@@ -76,16 +76,13 @@ Network string_on_stop() {
   }
   network.third = ThirdArgument::delayed_position;
   network.inputs.clear();
-  const auto number = [&](double value) {
-    network.arguments.push_back({{Op::number, 0, value}});
-    return static_cast<ArgumentId>(network.arguments.size() - 1);
-  };
   Mass stop{.kind = MassKind::ground, .position = -0.02, .third = -0.02};
   network.masses.push_back(stop);
   Link touch{.law = law_named("contact"),
              .a = static_cast<std::uint32_t>(network.masses.size() - 1),
              .b = mass_called(network, "s_m20")};
-  touch.arguments = {number(10.0), number(0.0), number(0.0), no_argument, no_argument};
+  touch.arguments = {network.add(10.0), network.add(0.0), network.add(0.0), no_argument,
+                     no_argument};
   network.links.push_back(touch);
   return canonical(std::move(network));
 }

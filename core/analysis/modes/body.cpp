@@ -118,21 +118,17 @@ class ChainWriter {
  public:
   explicit ChainWriter(std::string name) : name_(std::move(name)) {}
 
-  ArgumentId number(double value) {
-    network_.arguments.push_back({{.op = Op::number, .value = value}});
-    return static_cast<ArgumentId>(network_.arguments.size() - 1);
-  }
   void add_mass(double mass, double stiffness, double damping) {
     network_.masses.push_back({.name = name_ + "_m" + std::to_string(network_.masses.size()),
                                .kind = MassKind::oscillator,
-                               .mass = number(mass),
-                               .stiffness = number(stiffness),
-                               .damping = number(damping)});
+                               .mass = network_.add(mass),
+                               .stiffness = network_.add(stiffness),
+                               .damping = network_.add(damping)});
   }
   void add_spring(std::uint32_t from, double stiffness, double damping) {
     Link link{.name = name_ + "_r" + std::to_string(from), .a = from, .b = from + 1};
-    link.arguments[0] = number(stiffness);
-    link.arguments[1] = number(damping);
+    link.arguments[0] = network_.add(stiffness);
+    link.arguments[1] = network_.add(damping);
     network_.links.push_back(std::move(link));
   }
   Network take() { return canonical(std::move(network_)); }

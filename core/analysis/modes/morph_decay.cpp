@@ -126,8 +126,7 @@ Network with_even_decay(Network network, const MorphedDecay& morph) {
       Formula formula = network.arguments[id];
       formula.insert(formula.end(), factor->begin(), factor->end());
       formula.push_back({Op::multiply});
-      network.arguments.push_back(std::move(formula));
-      id = static_cast<ArgumentId>(network.arguments.size() - 1);
+      id = network.add(std::move(formula));
     }
   };
   for (Mass& mass : network.masses) {

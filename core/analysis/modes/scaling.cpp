@@ -74,7 +74,7 @@ class Arguments {
     }
     Formula formula = network_.arguments[id];
     if (is_constant(formula)) {
-      return number(evaluate(formula, {}) * factor);
+      return network_.add(evaluate(formula, {}) * factor);
     }
     const std::size_t size = formula.size();
     if (size > 2 && formula[size - 1].op == Op::multiply && formula[size - 2].op == Op::number) {
@@ -84,16 +84,10 @@ class Arguments {
       formula.push_back({.op = Op::number, .value = factor});
       formula.push_back({.op = Op::multiply});
     }
-    return add(std::move(formula));
+    return network_.add(std::move(formula));
   }
-  ArgumentId number(double value) { return add({{.op = Op::number, .value = value}}); }
 
  private:
-  ArgumentId add(Formula formula) {
-    network_.arguments.push_back(std::move(formula));
-    return static_cast<ArgumentId>(network_.arguments.size() - 1);
-  }
-
   Network& network_;
 };
 
@@ -273,17 +267,13 @@ Network with_decay(const Network& network, const DecayLaw& law) {
     return is_constant(formula) ? Formula{{.op = Op::number, .value = evaluate(formula, {})}}
                                 : formula;
   };
-  const auto add = [&](Formula formula) {
-    out.arguments.push_back(std::move(formula));
-    return static_cast<ArgumentId>(out.arguments.size() - 1);
-  };
   for (Mass& mass : out.masses) {
     if (mass.kind == MassKind::mass && by_mass > 0.0) {
       mass.kind = MassKind::oscillator;
-      mass.stiffness = arguments.number(0.0);
+      mass.stiffness = out.add(0.0);
     }
     if (mass.kind == MassKind::oscillator) {
-      mass.damping = add(of_both(mass.mass, mass.stiffness));
+      mass.damping = out.add(of_both(mass.mass, mass.stiffness));
     }
   }
   for (Macro& macro : out.macros) {
@@ -294,9 +284,8 @@ Network with_decay(const Network& network, const DecayLaw& law) {
     if (is_spring(link)) {
       const LawFacts& facts = facts_of(link.law);
       const ArgumentId stiffness = link.arguments[facts.slot(Role::stiffness)];
-      link.arguments[facts.slot(Role::damping)] = stiffness == no_argument
-                                                      ? arguments.number(0.0)
-                                                      : arguments.times(stiffness, by_stiffness);
+      link.arguments[facts.slot(Role::damping)] =
+          stiffness == no_argument ? out.add(0.0) : arguments.times(stiffness, by_stiffness);
     }
   }
   return canonical(std::move(out));

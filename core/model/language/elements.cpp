@@ -267,8 +267,7 @@ ArgumentId Reader::expression(const Line& line, const Token& token) {
     error(line, token, quoted(token.text) + " is not a finite number");
     return no_argument;
   }
-  const auto id = static_cast<ArgumentId>(out_.network.arguments.size());
-  out_.network.arguments.push_back(std::move(formula));
+  const ArgumentId id = out_.network.add(std::move(formula));
   arguments_.emplace(token.text, id);
   return id;
 }
@@ -436,13 +435,7 @@ std::optional<std::uint32_t> Reader::named_place(const Line& line, const Token& 
               joined(body.places, ", ") + ")" + suggestion(name.text, names));
     return std::nullopt;
   }
-  ArgumentId u = no_argument;
-  if (place) {
-    u = static_cast<ArgumentId>(network.arguments.size());
-    network.arguments.push_back({{Op::number, 0, *place}});
-  } else {
-    u = expression(line, name);
-  }
+  const ArgumentId u = place ? network.add(*place) : expression(line, name);
   return add_point(line, token, {.macro = macro, .u = u});
 }
 
