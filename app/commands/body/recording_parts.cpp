@@ -12,16 +12,6 @@ namespace {
 constexpr double highest_peak = 0.9;
 constexpr double measured_s = 0.5;  // The loudness needs at least 0.4 s.
 
-double peak_of(const Sound& sound) {
-  double peak = 0.0;
-  for (const std::vector<double>& channel : sound.channels) {
-    for (const double x : channel) {
-      peak = std::max(peak, std::fabs(x));
-    }
-  }
-  return peak;
-}
-
 void scale(Sound& sound, double gain) {
   for (std::vector<double>& channel : sound.channels) {
     for (double& x : channel) {

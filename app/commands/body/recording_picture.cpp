@@ -107,7 +107,7 @@ std::vector<plot::Panel> spectrogram_panels(const RecordingParts& parts) {
   constexpr double longest_s = 2.0;
   const double length_s =
       std::min(longest_s, static_cast<double>(parts.recording.frames()) / parts.recording.rate_hz);
-  const double gain_db = -12.0 - peak_dbfs(parts.recording);
+  const double gain_db = -12.0 - to_dbfs(peak_of(parts.recording));
   std::vector<plot::Panel> panels;
   const std::pair<const char*, const Sound*> shown[] = {{"Recording", &parts.recording},
                                                         {"Modes and noise", &parts.sum},

@@ -16,6 +16,7 @@
 #include "app/realtime/lockfree.h"
 #include "app/session/files.h"
 #include "app/text.h"
+#include "core/model/language/tokens.h"
 #include "core/ranges.h"
 #include "core/solids/shell.h"
 
@@ -56,13 +57,6 @@ std::string body_name(const std::string& file) {
   const bool has_letter = !name.empty() && std::isalpha(static_cast<unsigned char>(name[0])) != 0;
   const bool is_taken = name == "in1" || name == "out1" || name == "out2";
   return has_letter && !is_taken ? name : "body" + (name.empty() ? "" : "_" + name);
-}
-
-bool is_place_name(const std::string& name) {
-  return !name.empty() && std::isalpha(static_cast<unsigned char>(name[0])) != 0 &&
-         std::ranges::all_of(name, [](char c) {
-           return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
-         });
 }
 
 std::string digits(double number, int significant) {
@@ -308,7 +302,7 @@ Result<PickedPlace> parse_place(const std::string& text) {
   const auto numbers =
       equals == std::string::npos ? std::nullopt : numbers_of(text.substr(equals + 1));
   if (!numbers || (numbers->size() != 3 && numbers->size() != 6) ||
-      !is_place_name(text.substr(0, equals))) {
+      !is_identifier(text.substr(0, equals))) {
     return Error{"expected NAME=X,Y,Z, or with a direction NAME=X,Y,Z,DX,DY,DZ, found '" + text +
                  "'"};
   }

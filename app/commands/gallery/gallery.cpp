@@ -111,7 +111,7 @@ Result<Take> play_notes(const GalleryOptions& options, const std::string& preset
 
 PresetFigures measure_sounds(const Take& phrase, const Take& note) {
   const auto loudness = loudness_lufs(phrase.sound);
-  return {.peak_dbfs = peak_dbfs(phrase.sound),
+  return {.peak_dbfs = to_dbfs(peak_of(phrase.sound)),
           .loudness_lufs = loudness ? *loudness : silence_db,
           .attack_ms = attack_ms(note.sound, {0.0, held_s}),
           .held_t60_s = t60_s(note.sound, {0.0, held_s}),

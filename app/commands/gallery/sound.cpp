@@ -36,14 +36,14 @@ double to_dbfs(double amplitude) {
   return power_db(amplitude * amplitude);
 }
 
-double peak_dbfs(const Sound& sound) {
+double peak_of(const Sound& sound) {
   double peak = 0.0;
   for (const std::vector<double>& channel : sound.channels) {
     for (const double y : channel) {
       peak = std::max(peak, std::fabs(y));
     }
   }
-  return to_dbfs(peak);
+  return peak;
 }
 
 std::vector<double> levels_db(const Sound& sound, Stretch stretch, double step_s) {

@@ -19,8 +19,8 @@ inline constexpr double silence_db = -200.0;  // lowest level, also of silence
 
 double to_dbfs(double amplitude);
 
-// Returns the level of the largest sample.
-double peak_dbfs(const Sound& sound);
+// Returns the magnitude of the largest sample.
+double peak_of(const Sound& sound);
 
 // Returns the integrated loudness of the whole sound (ITU-R BS.1770-4, EBU R 128). Fails where
 // libebur128 does not support the rate or has no memory.

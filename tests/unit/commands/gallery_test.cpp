@@ -48,8 +48,8 @@ TEST_CASE("Loudness follows BS.1770 and EBU Tech 3341", "[gallery]") {
 
 TEST_CASE("The peak is that of the louder channel", "[gallery]") {
   const Sound heard = sound({sine(100.0, 0.25, 2.0), sine(100.0, 0.5, 2.0)});
-  CHECK(std::fabs(peak_dbfs(heard) - 20.0 * std::log10(0.5)) < 1e-9);
-  CHECK(peak_dbfs(sound({{0.0, 0.0}})) == silence_db);
+  CHECK(std::fabs(to_dbfs(peak_of(heard)) - 20.0 * std::log10(0.5)) < 1e-9);
+  CHECK(to_dbfs(peak_of(sound({{0.0, 0.0}}))) == silence_db);
 }
 
 TEST_CASE("T60 is ln(1000) times the time constant", "[gallery]") {
