@@ -5,6 +5,7 @@
 #include <numbers>
 #include <utility>
 
+#include "core/analysis/modes/linear_system.h"
 #include "core/analysis/places.h"
 #include "core/laws/law.h"
 #include "core/linear_algebra/cholesky.h"
@@ -23,200 +24,96 @@ constexpr std::size_t most_shapes = 12;
 constexpr std::size_t most_given = 3;
 constexpr std::size_t most_fixed_shapes = 64;
 
-// The linear part of a network: the moving masses, numbered consecutively, and their springs.
-class Body {
- public:
-  Body(const Network& network, std::span<const double> parameters)
-      : network_(network), parameters_(parameters), index_(network.masses.size(), held) {
-    for (const Formula& formula : network.arguments) {
-      values_.push_back(evaluate(formula, parameters));
-    }
-    for (std::size_t i = 0; i < network.masses.size(); ++i) {
-      const Mass& mass = network.masses[i];
-      if (moves(mass)) {
-        index_[i] = static_cast<int>(scale_.size());
-        scale_.push_back(1.0 / std::sqrt(value(mass.mass)));
-      }
-    }
+// Returns the linear system of a network at these parameters, without inputs and outputs.
+LinearSystem system_of(const Network& network, std::span<const double> parameters) {
+  Network still = evaluated(network, parameters);
+  still.inputs.clear();
+  still.outputs.clear();
+  return make_linear_system(still, 1.0, false);
+}
+
+double stretch_of(std::span<const std::pair<std::uint32_t, double>> shares, const Vector& vector) {
+  double sum = 0.0;
+  for (const auto& [row, share] : shares) {
+    sum += share * vector[row];
   }
+  return sum;
+}
 
-  int size() const { return static_cast<int>(scale_.size()); }
-
-  // Extends a shape of the network whose fixed masses are held to a shape of the whole.
-  Vector lifted(const Body& held, const Vector& shape) const {
-    Vector all(scale_.size());
-    for (std::size_t i = 0; i < index_.size(); ++i) {
-      if (held.index_[i] != Body::held) {
-        all[static_cast<std::size_t>(index_[i])] = shape[static_cast<std::size_t>(held.index_[i])];
-      }
-    }
-    return all;
-  }
-  // Returns the fixed masses as unit shapes, at most `most` of them.
-  std::vector<Vector> fixed_shapes(std::size_t most) const {
-    std::vector<Vector> shapes;
-    for (std::size_t i = 0; i < index_.size() && shapes.size() < most; ++i) {
-      if (index_[i] != held && network_.masses[i].is_fixed) {
-        shapes.emplace_back(scale_.size());
-        shapes.back()[static_cast<std::size_t>(index_[i])] = 1.0;
-      }
-    }
-    return shapes;
-  }
-
-  // Returns the share of a shape's motion that belongs to modes of bodies, 0 to 1.
-  double share_of_modes(const Vector& shape) const {
-    double sum = 0.0;
-    for (std::size_t i = 0; i < index_.size(); ++i) {
-      if (network_.masses[i].is_mode) {
-        const double part = shape[static_cast<std::size_t>(index_[i])];
-        sum += part * part;
-      }
-    }
-    return sum / dot(shape, shape);
-  }
-
-  // Returns M^(-1/2) K M^(-1/2), its lower triangle.
-  SparseMatrix stiffness() const {
-    std::vector<double> diagonal(scale_.size());
-    std::vector<SparseMatrix::Element> elements;
-    elements.reserve(network_.links.size() + scale_.size());
-    each_spring([&](const Shares& shares, double k, double, bool) {
-      for (std::size_t p = 0; p < shares.of.size(); ++p) {
-        for (std::size_t q = 0; q <= p; ++q) {
-          const auto [i, a] = shares.of[p];
-          const auto [j, b] = shares.of[q];
-          if (i == j) {
-            diagonal[static_cast<std::size_t>(i)] += (p == q ? 1.0 : 2.0) * k * a * b;
-          } else if (k != 0.0) {
-            elements.push_back({std::max(i, j), std::min(i, j), k * a * b});
-          }
-        }
-      }
-    });
-    for (int i = 0; i < size(); ++i) {
-      elements.push_back({i, i, diagonal[static_cast<std::size_t>(i)]});
-    }
-    return {size(), elements};
-  }
-
-  // Returns M^(-1/2) Z M^(-1/2) times a vector.
-  Vector damped(const Vector& vector) const {
-    Vector sum(vector.size());
-    each_spring([&](const Shares& shares, double, double z, bool) {
-      const double force = z * shares.along(vector);
-      for (const auto& [row, share] : shares.of) {
-        sum[static_cast<std::size_t>(row)] += force * share;
-      }
-    });
-    return sum;
-  }
-
-  // Projections on some vectors: the part of K that keys scale, Z, and the fixed part of K.
-  struct Between {
-    Matrix stiffness;
-    Matrix damping;
-    Matrix fixed;
-  };
-  Between between(const std::vector<Vector>& vectors) const {
-    const std::size_t count = vectors.size();
-    Between all{Matrix(count, count), Matrix(count, count), Matrix(count, count)};
-    std::vector<double> stretch(count);
-    each_spring([&](const Shares& shares, double k, double z, bool is_fixed) {
-      Matrix& stiffness = is_fixed ? all.fixed : all.stiffness;
-      Matrix& damping = all.damping;
-      for (std::size_t i = 0; i < count; ++i) {
-        stretch[i] = shares.along(vectors[i]);
-        for (std::size_t j = 0; j <= i; ++j) {
-          stiffness(i, j) = stiffness(j, i) += k * stretch[i] * stretch[j];
-          damping(i, j) = damping(j, i) += z * stretch[i] * stretch[j];
-        }
-      }
-    });
-    return all;
-  }
-
- private:
-  static constexpr int held = -1;
-
-  // A link's elongation as a sum over rows: two masses, the masses around a place, or the modes of
-  // a body.
-  struct Shares {
-    double along(const Vector& vector) const {
-      double sum = 0.0;
-      for (const auto& [row, share] : of) {
-        sum += share * vector[static_cast<std::size_t>(row)];
-      }
-      return sum;
-    }
-
-    std::vector<std::pair<int, double>> of;
-  };
-
-  double value(ArgumentId id) const { return id == no_argument ? 0.0 : values_[id]; }
-
-  void hang(Shares& shares, std::uint32_t mass, double sign) const {
-    each_share(
-        network_, mass,
-        [&](std::uint32_t i, double share) {
-          if (index_[i] != held) {
-            shares.of.emplace_back(index_[i],
-                                   sign * share * scale_[static_cast<std::size_t>(index_[i])]);
-          }
-        },
-        parameters_);
-  }
-
-  // Calls use(shares, k, z, is_fixed).
-  template <class Use>
-  void each_spring(Use&& use) const {
-    Shares shares;
-    for (std::uint32_t i = 0; i < index_.size(); ++i) {
-      const Mass& mass = network_.masses[i];
-      if (mass.kind == MassKind::oscillator) {
-        shares.of.clear();
-        hang(shares, i, 1.0);
-        use(shares, value(mass.stiffness), value(mass.damping), mass.is_fixed);
-      }
-    }
-    for (const Link& link : network_.links) {
-      if (link.a != link.b) {
-        const LinearPart part = linear_part(link);
-        shares.of.clear();
-        hang(shares, link.a, 1.0);
-        hang(shares, link.b, -1.0);
-        use(shares, value(part.stiffness), value(part.damping), link.is_fixed);
-      }
+// Returns the damping matrix times a vector.
+Vector damped(const LinearSystem& system, const Vector& vector) {
+  Vector sum(vector.size());
+  for (const ModalSpring& spring : system.springs) {
+    const double force = spring.damping * stretch_of(system.of(spring), vector);
+    for (const auto& [row, share] : system.of(spring)) {
+      sum[row] += force * share;
     }
   }
+  return sum;
+}
 
-  const Network& network_;
-  std::span<const double> parameters_;
-  std::vector<double> values_;  // [argument]
-  std::vector<int> index_;      // [mass] Index among the moving masses, or held.
-  std::vector<double> scale_;   // [moving mass] M^(-1/2).
+// Extends a shape of the system whose fixed masses are held to a shape of the whole.
+Vector lifted(const LinearSystem& whole, const LinearSystem& part, const Vector& shape) {
+  Vector all(whole.size());
+  for (std::size_t i = 0; i < part.size(); ++i) {
+    const auto row = std::ranges::lower_bound(whole.masses, part.masses[i]);
+    all[static_cast<std::size_t>(row - whole.masses.begin())] = shape[i];
+  }
+  return all;
+}
+
+// Returns the fixed masses as unit shapes, at most most_fixed_shapes of them.
+std::vector<Vector> fixed_shapes(const Network& network, const LinearSystem& system) {
+  std::vector<Vector> shapes;
+  for (std::size_t i = 0; i < system.size() && shapes.size() < most_fixed_shapes; ++i) {
+    if (network.masses[system.masses[i]].is_fixed) {
+      shapes.emplace_back(system.size());
+      shapes.back()[i] = 1.0;
+    }
+  }
+  return shapes;
+}
+
+// Returns the share of a shape's motion that belongs to modes of bodies, 0 to 1.
+double share_of_modes(const Network& network, const LinearSystem& system, const Vector& shape) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < system.size(); ++i) {
+    sum += network.masses[system.masses[i]].is_mode ? shape[i] * shape[i] : 0.0;
+  }
+  return sum / dot(shape, shape);
+}
+
+// Projections on some vectors: the part of K that keys scale, Z, and the fixed part of K.
+struct Projections {
+  Matrix stiffness;
+  Matrix damping;
+  Matrix fixed;
 };
-
-// Calls use(row, column, value) for every element on and below the diagonal.
-template <class Use>
-void each_element(const SparseMatrix& lower, Use&& use) {
-  for (std::size_t column = 0; column + 1 < lower.first.size(); ++column) {
-    for (auto i = static_cast<std::size_t>(lower.first[column]);
-         i < static_cast<std::size_t>(lower.first[column + 1]); ++i) {
-      use(static_cast<std::size_t>(lower.row[i]), column, lower.value[i]);
+Projections project(const Network& network, const LinearSystem& system,
+                    const std::vector<Vector>& vectors) {
+  const std::size_t count = vectors.size();
+  Projections all{Matrix(count, count), Matrix(count, count), Matrix(count, count)};
+  std::vector<double> stretch(count);
+  for (const ModalSpring& spring : system.springs) {
+    const bool is_fixed = spring.is_link ? network.links[spring.element].is_fixed
+                                         : network.masses[spring.element].is_fixed;
+    Matrix& stiffness = is_fixed ? all.fixed : all.stiffness;
+    Matrix& damping = all.damping;
+    for (std::size_t i = 0; i < count; ++i) {
+      stretch[i] = stretch_of(system.of(spring), vectors[i]);
+      for (std::size_t j = 0; j <= i; ++j) {
+        stiffness(i, j) = stiffness(j, i) += spring.stiffness * stretch[i] * stretch[j];
+        damping(i, j) = damping(j, i) += spring.damping * stretch[i] * stretch[j];
+      }
     }
   }
+  return all;
 }
 
 // The factorisation does not pivot, so an indefinite matrix may lose digits. Returns whether A x is
 // value x nevertheless.
 bool is_pair(const SparseMatrix& lower, double value, const Vector& vector, double most) {
-  Vector left = -value * vector;
-  each_element(lower, [&](std::size_t i, std::size_t j, double element) {
-    left[i] += element * vector[j];
-    left[j] += i == j ? 0.0 : element * vector[i];
-  });
-  return largest(left) <= most;
+  return largest(product(lower, vector) - value * vector) <= most;
 }
 
 // Computes eigenpairs from 0 upwards, as many as requested; all of them for a small matrix.
@@ -321,7 +218,8 @@ std::optional<Vector> apart_from(const std::vector<Vector>& others, Vector vecto
 
 // Returns the lowest shapes, the least damped of degenerate ones first, and the static response of
 // the network to the first one's dampers.
-std::vector<Vector> shapes_of(const Body& body, const Lowest& lowest, Spectrum& spectrum) {
+std::vector<Vector> shapes_of(const Network& network, const LinearSystem& system,
+                              const Lowest& lowest, Spectrum& spectrum) {
   const auto& [pairs, first] = lowest;
   const std::size_t count = std::min(pairs.vectors.columns(), most_shapes);
   std::vector<Vector> alike;
@@ -330,7 +228,7 @@ std::vector<Vector> shapes_of(const Body& body, const Lowest& lowest, Spectrum& 
     const bool is_alike = i >= first && pairs.values[i] < pairs.values[first] * (1.0 + same);
     (is_alike ? alike : others).push_back(pairs.vectors.column(i));
   }
-  const Matrix turn = symmetric_eigenpairs(body.between(alike).damping).vectors;
+  const Matrix turn = symmetric_eigenpairs(project(network, system, alike).damping).vectors;
   std::vector<Vector> shapes;
   for (std::size_t i = 0; i < alike.size(); ++i) {
     shapes.emplace_back(alike[0].size());
@@ -341,7 +239,7 @@ std::vector<Vector> shapes_of(const Body& body, const Lowest& lowest, Spectrum& 
   shapes.insert(shapes.end(), others.begin(), others.end());
   Vector shape = shapes.front();
   for (std::size_t i = 0; i < most_given && shapes.size() < alike[0].size(); ++i) {
-    const std::optional<Vector> given = spectrum.inverse(body.damped(shape));
+    const std::optional<Vector> given = spectrum.inverse(damped(system, shape));
     const auto apart = given ? apart_from(shapes, *given) : std::nullopt;
     if (!apart) {
       break;
@@ -389,10 +287,10 @@ double scheme_frequency_hz(double stiffness, double damping, double rate_hz) {
 std::optional<LowestShapes> lowest_shapes(const Network& network,
                                           std::span<const double> parameters,
                                           const Progress& progress) {
-  const Body whole(network, parameters);
-  const std::optional<Network> still = fixed_held(network);
-  const Body body(still ? *still : network, parameters);
-  const SparseMatrix stiffness = body.stiffness();
+  const std::optional<Network> held = fixed_held(network);
+  const Network& loose = held ? *held : network;
+  const LinearSystem system = system_of(loose, parameters);
+  const SparseMatrix stiffness = system.stiffness();
   double stiffest = 0.0;
   for (const double value : stiffness.value) {
     stiffest = std::max(stiffest, std::fabs(value));
@@ -408,19 +306,20 @@ std::optional<LowestShapes> lowest_shapes(const Network& network,
     return std::nullopt;
   }
   LowestShapes found;
-  std::vector<Vector> shapes = shapes_of(body, *lowest, spectrum);
-  found.share_of_modes = body.share_of_modes(shapes.front());
-  if (still) {
+  std::vector<Vector> shapes = shapes_of(loose, system, *lowest, spectrum);
+  found.share_of_modes = share_of_modes(loose, system, shapes.front());
+  const LinearSystem whole = held ? system_of(network, parameters) : system;
+  if (held) {
     for (Vector& shape : shapes) {
-      shape = whole.lifted(body, shape);
+      shape = lifted(whole, system, shape);
     }
-    const std::vector<Vector> fixed = whole.fixed_shapes(most_fixed_shapes);
+    const std::vector<Vector> fixed = fixed_shapes(network, whole);
     shapes.insert(shapes.end(), fixed.begin(), fixed.end());
   }
-  Body::Between between = whole.between(shapes);
-  found.stiffness = std::move(between.stiffness);
-  found.damping = std::move(between.damping);
-  found.fixed = std::move(between.fixed);
+  Projections projected = project(network, whole, shapes);
+  found.stiffness = std::move(projected.stiffness);
+  found.damping = std::move(projected.damping);
+  found.fixed = std::move(projected.fixed);
   found.mode.stiffness = lowest->pairs.values[lowest->first];
   found.mode.damping = found.damping(0, 0);
   found.mode.frequency_hz =

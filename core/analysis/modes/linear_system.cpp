@@ -38,7 +38,7 @@ class SystemMaker {
       made_.is_sound = made_.is_sound && std::isfinite(k) && std::isfinite(z);
       const auto first = static_cast<std::uint32_t>(made_.shares.size());
       for (const Assembly::Entry& entry : assembly.of(term)) {
-        made_.shares.emplace_back(entry.row, entry.share / made_.root[entry.row]);
+        made_.shares.emplace_back(entry.row, entry.share * (1.0 / made_.root[entry.row]));
       }
       made_.springs.push_back({.first = first,
                                .count = term.count,
@@ -158,6 +158,9 @@ SparseMatrix matrix_of(const LinearSystem& system, double ModalSpring::*number,
     for (std::size_t p = 0; p < shares.size(); ++p) {
       diagonal[shares[p].first] += w * shares[p].second * shares[p].second;
       for (std::size_t q = 0; q < p; ++q) {
+        if (w == 0.0) {
+          continue;
+        }
         const auto i = static_cast<int>(shares[p].first);
         const auto j = static_cast<int>(shares[q].first);
         elements.push_back(
