@@ -350,4 +350,45 @@ double Stability::stiffness_factor(const ParameterBox& box) {
   return boundary_.holds(line(0.0), 4.0) ? boundary_.between(line, 0.0, 1.0).value : 0.0;
 }
 
+double Stability::bounded_stiffness_factor(const ParameterBox& box) {
+  // At slightly less than the limit of 4, modes near the Nyquist frequency still decay.
+  constexpr double limit = 4.0 * 0.98;
+  // The parts that scale with the factor, and the constant rest. Bow friction scales with the
+  // square root of the factor; scaling it with the factor itself is conservative above 1.
+  struct Sum {
+    double stiff = 0.0;
+    double damped = 0.0;
+    void add(const Sum& other, double share) {
+      stiff += share * other.stiff;
+      damped += share * other.damped;
+    }
+  };
+  const std::span<const Range> arguments = ranges(box);
+  const std::span<const Load> all = loads(arguments);
+  std::vector<Sum> sums(assembly_.masses.size());  // [row] d_i, then d_i/m_i
+  for (std::size_t t = 0; t < all.size(); ++t) {
+    for (const Assembly::Entry& entry : assembly_.of(assembly_.terms[t])) {
+      sums[entry.row].add({all[t].stiff + all[t].rubbed, all[t].damped}, std::fabs(entry.share));
+    }
+  }
+  for (std::size_t row = 0; row < sums.size(); ++row) {
+    const double mass = range_at(arguments, network_.masses[assembly_.masses[row]].mass).lowest;
+    const double inverse = 1.0 / std::max(1e-30, mass);
+    sums[row] = {sums[row].stiff * inverse, sums[row].damped * inverse};
+  }
+  double factor = assembly_.is_complete ? most_bounded : 0.0;
+  for (const Assembly::Term& term : assembly_.terms) {
+    Sum both;
+    for (const Assembly::Entry& entry : assembly_.of(term)) {
+      both.add(sums[entry.row], std::fabs(entry.share));
+    }
+    if (both.stiff > 0.0) {
+      factor = std::min(factor, (limit - both.damped) / both.stiff);
+    } else if (both.damped > limit) {
+      factor = 0.0;
+    }
+  }
+  return factor;
+}
+
 }  // namespace ressort::analysis

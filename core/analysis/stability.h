@@ -25,14 +25,7 @@
 
 namespace ressort::analysis {
 
-// Returns a factor on every stiffness up to which the explicit scheme is stable anywhere in the
-// box, from the edge bound: max over links of (d_i/m_i + d_j/m_j) < 3.92, where d is the sum of k +
-// 2z at a mass. A place counts with the masses around it, a live one with the worst of them.
-// `rate_ratio` is 44100 / rate. Not above 0 if the dampers alone are too strong; most_bounded if
-// nothing limits it. At most two times too small if no place is live. For a network without macros.
-// O(masses + links). [any thread but audio]
-inline constexpr double most_bounded = 1e9;
-double highest_stiffness_factor(const Network& network, const ParameterBox& box, double rate_ratio);
+inline constexpr double most_bounded = 1e9;  // The edge bound of a network that nothing limits.
 
 enum class Quantity { mass, stiffness, damping };
 const char* quantity_name(Quantity quantity);
@@ -125,6 +118,10 @@ class Stability {
   // box; bows scale with its square root. 0 if the dampers alone are too strong, infinite if
   // unlimited.
   double stiffness_factor(const ParameterBox& box);
+  // Returns such a factor from the edge bound: max over links of (d_i/m_i + d_j/m_j) < 3.92, where
+  // d is the sum of k + 2z at a mass. Not above 0 if the dampers alone are too strong; most_bounded
+  // if nothing limits it. At most two times too small if no place is live. O(masses + links)
+  double bounded_stiffness_factor(const ParameterBox& box);
 
  private:
   // Replaces the range of an argument for one quantity. The same text may be a stiffness in one

@@ -388,31 +388,28 @@ class StabilityChecker {
 class MarginFinder {
  public:
   MarginFinder(const Network& network, double rate_ratio, const Progress& progress)
-      : network_(network), rate_ratio_(rate_ratio), progress_(progress) {
-    if (network.masses.size() <= most_quick_masses) {
-      stability_.emplace(network, rate_ratio, most_quick_masses, progress);
-    }
-  }
+      : is_quick_(network.masses.size() <= most_quick_masses),
+        progress_(progress),
+        stability_(network, rate_ratio, most_quick_masses, progress) {}
 
   struct Factors {
     double whole = 0.0;
     double keys = 0.0;
   };
   Factors at(const ParameterBox& box) {
-    progress_.spend(4 * network_.links.size());
-    const double bound = highest_stiffness_factor(network_, box, rate_ratio_);
-    const double whole = bound >= most_bounded || !stability_
+    progress_.spend(4 * stability_.size());
+    const double bound = stability_.bounded_stiffness_factor(box);
+    const double whole = bound >= most_bounded || !is_quick_
                              ? bound
-                             : std::min(most_bounded, stability_->stiffness_factor(box));
+                             : std::min(most_bounded, stability_.stiffness_factor(box));
     return {whole,
             std::max(bound, keys_share * whole)};  // the edge bound is conservative by itself
   }
 
  private:
-  const Network& network_;
-  double rate_ratio_;
+  const bool is_quick_;
   const Progress& progress_;
-  std::optional<Stability> stability_;
+  Stability stability_;
 };
 
 }  // namespace

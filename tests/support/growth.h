@@ -17,7 +17,7 @@ inline const std::string mass_and_ground = "@m mass 2. 0. 0.\n@g ground 0.\n";
 inline double factor_of(const std::string& text, double rate_ratio = 1.0) {
   const Network network = expand_macros(network_of(text));
   const auto values = parameter_values(network);
-  return highest_stiffness_factor(network, {values, values}, rate_ratio);
+  return Stability(network, rate_ratio).bounded_stiffness_factor({values, values});
 }
 
 // Growth of a network after an impulse, with every stiffness multiplied by a factor.

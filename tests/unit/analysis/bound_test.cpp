@@ -84,7 +84,7 @@ TEST_CASE("the edge bound handles unlimited networks and excessive dampers", "[b
 TEST_CASE("the worst corner of the parameters' box counts", "[bound]") {
   const Network network = network_of(scenes::string("s", 50, "0.1", "0.001"));
   const ParameterBox box{{0.5, 0.01, 0.0}, {4.0, 0.2, 0.01}};  // M, K, Z
-  CHECK(highest_stiffness_factor(network, box, 1.0) ==
+  CHECK(Stability(network, 1.0).bounded_stiffness_factor(box) ==
         Approx((bound_limit - .08 / .5) / (.8 / .5)).epsilon(1e-14));
 }
 
