@@ -63,11 +63,10 @@ class Chooser {
         eigenvectors_of_(most_tied_masses(program)),
         budget_(budget) {}
 
-  // Chooses a form that keeps the remaining budget of pitch and decay.
-  Part choose(AccuracyMeter& meter, const Accuracy& spent) {
-    spent_ = spent;
+  // Chooses a form that keeps the budget of pitch and decay.
+  Part choose(AccuracyMeter& meter) {
     meter_ = &meter;
-    const Accuracy published = sum_of(meter.of(Form()), spent_);
+    const Accuracy published = meter.of(Form());
     if (published.meets(budget_)) {
       budget_.cents = budget_.t60_percent = Budget::unlimited;
       meter_ = nullptr;
@@ -93,8 +92,7 @@ class Chooser {
 
   // Chooses exact modes, which are stable at any stiffness, or enough steps a sample for the
   // stiffest key, or any form of free modes; nothing if the part has none of these.
-  std::optional<Part> reach(AccuracyMeter* meter, const Accuracy& spent) {
-    spent_ = spent;
+  std::optional<Part> reach(AccuracyMeter* meter) {
     meter_ = meter;
     // Modes contain only the linear part of a nonlinear spring. The rest uses the published scheme,
     // so its stability limit applies.
@@ -104,8 +102,7 @@ class Chooser {
     may_gain_ = eigenvectors_of_ > most_modes_ && eigenvectors_of_ <= patient_modes;
     const std::uint32_t times = steps_to_reach();
     if (program_.modes.empty() && times <= most_steps_to_reach && !may_gain_) {
-      const bool is_by_key =
-          times > 1 && (meter_ == nullptr || sum_of(meter_->of(Form()), spent_).meets(budget_));
+      const bool is_by_key = times > 1 && (meter_ == nullptr || meter_->of(Form()).meets(budget_));
       add_steps(times, load_at_steps(), {}, is_by_key);
     }
     if (candidates_.empty() && has_free_modes(program_)) {
@@ -136,9 +133,8 @@ class Chooser {
     Form form;
     std::string name;
     double operations;
-    double share_of_one;              // of one voice, of the operations of all
-    std::optional<Accuracy> of_form;  // error of this form alone
-    Accuracy accuracy;                // including the error of the parts before
+    double share_of_one;  // of one voice, of the operations of all
+    Accuracy accuracy;
     std::optional<double> measured_ns = {};
   };
 
@@ -207,7 +203,7 @@ class Chooser {
     for (const std::size_t i : all) {
       fine.form = chooser.candidates_[i].form;
       add(Method::oversampled, oversampled_form(fine, times, by_key), accuracy);
-      accuracy = candidates_.back().of_form;
+      accuracy = candidates_.back().accuracy;
     }
   }
 
@@ -264,19 +260,18 @@ class Chooser {
     return excess(a) != excess(b) ? excess(a) < excess(b) : cost(a) < cost(b);
   }
 
-  void add(Method method, Form form, std::optional<Accuracy> of_form = {}) {
-    if (meter_ != nullptr && !of_form) {
-      of_form = meter_->of(form);
+  void add(Method method, Form form, std::optional<Accuracy> accuracy = {}) {
+    if (meter_ != nullptr && !accuracy) {
+      accuracy = meter_->of(form);
     }
-    const Accuracy accuracy = of_form ? sum_of(*of_form, spent_) : Accuracy{};
     program_.form = std::move(form);
     const double count = operations(program_, load_);
     Workload one = load_;
     one.voices = 1;
     const double share = operations(program_, one) / count;
     std::string name = form_name(program_.form);
-    candidates_.push_back(
-        {method, std::move(program_.form), std::move(name), count, share, of_form, accuracy});
+    candidates_.push_back({method, std::move(program_.form), std::move(name), count, share,
+                           accuracy.value_or(Accuracy{})});
     if (is_better(candidates_.back(), candidates_[best_])) {
       best_ = candidates_.size() - 1;
     }
@@ -380,9 +375,8 @@ class Chooser {
   std::uint32_t eigenvectors_of_;   // connected masses
   Budget budget_;                   // without the limits that the published scheme keeps
   AccuracyMeter* meter_ = nullptr;  // null: the published scheme is accurate enough
-  Accuracy spent_;
-  Accuracy accuracy_;      // error of the chosen form
-  std::string published_;  // the error of the published scheme, if it is too large
+  Accuracy accuracy_;               // error of the chosen form
+  std::string published_;           // the error of the published scheme, if it is too large
   bool may_gain_ = false;
   bool is_untimed_ = false;
   std::vector<Candidate> candidates_;
@@ -412,13 +406,13 @@ std::optional<Planned> reach(const Machine& machine, const Workload& load, std::
                                load.wanted_factor),
                     most_modes, progress);
     }
-    std::optional<Part> part = chooser.reach(meter ? &*meter : nullptr, region.merged);
+    std::optional<Part> part = chooser.reach(meter ? &*meter : nullptr);
     may_gain |= chooser.may_gain();
     if (!part) {
       return std::nullopt;
     }
     if (meter) {
-      part->accuracy = sum_of(meter->of(program.form), region.merged);
+      part->accuracy = meter->of(program.form);
     }
     if (const auto* steps = program.form.get_if<Oversampled>()) {
       planned.more = std::min(planned.more, static_cast<double>(steps->times * steps->times));
@@ -453,11 +447,9 @@ Planned make_plan(Machine machine, const Workload& load, std::optional<Method> m
                                region.highest_factor),
                     most_modes, progress);
     }
-    Part part = method  ? chooser.obey(*method)
-                : meter ? chooser.choose(*meter, region.merged)
-                        : chooser.choose();
+    Part part = method ? chooser.obey(*method) : meter ? chooser.choose(*meter) : chooser.choose();
     if (meter && !part.accuracy) {
-      part.accuracy = sum_of(meter->of(program.form), region.merged);
+      part.accuracy = meter->of(program.form);
     }
     part.may_gain |= may_gain;
     if (part.masses > 0) {

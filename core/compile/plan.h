@@ -44,7 +44,7 @@ struct Part {
 struct Plan {
   std::vector<Part> parts;
   Budget budget;
-  std::optional<Accuracy> accuracy;  // error of the worst part, including merging
+  std::optional<Accuracy> accuracy;  // error of the worst part
   // notes on everything that is not computed as the model is written
   std::vector<std::string> notes;
 };
@@ -58,13 +58,11 @@ struct Planned {
   double more = 1.0;
 };
 
-// The parameter box and the keys for which a budget of pitch and decay has to hold, and what
-// merging has already used of it.
+// The parameter box and the keys for which a budget of pitch and decay has to hold.
 struct BudgetRegion {
   std::vector<double> lowest;  // [parameter]; empty: no parameter moves
   std::vector<double> highest;
   double highest_factor = 1.0;  // stiffness factor of the highest key
-  Accuracy merged;
 };
 
 // Inputs of the choice among the forms of a part, besides their estimates.

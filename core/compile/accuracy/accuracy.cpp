@@ -133,14 +133,6 @@ Accuracy worse_of(const Accuracy& a, const Accuracy& b) {
           .is_bound = a.is_bound || b.is_bound};
 }
 
-Accuracy sum_of(const Accuracy& a, const Accuracy& b) {
-  const auto is_something = [](const Accuracy& x) { return x.cents > 0.0 || x.t60_percent > 0.0; };
-  return {.cents = a.cents + b.cents,
-          .t60_percent = a.t60_percent + b.t60_percent,
-          .is_known = a.is_known && b.is_known,
-          .is_bound = a.is_bound || b.is_bound || (is_something(a) && is_something(b))};
-}
-
 std::vector<Corner> corners_of(const Program& program, std::span<const double> start_in,
                                std::span<const double> lowest, std::span<const double> highest,
                                double highest_factor) {

@@ -32,9 +32,8 @@ struct Accuracy {
   }
 };
 
-// Return the larger and the sum of two errors.
+// Returns the larger of two errors.
 Accuracy worse_of(const Accuracy& a, const Accuracy& b);
-Accuracy sum_of(const Accuracy& a, const Accuracy& b);
 
 // Parameter values and pitch at which errors are computed.
 struct Corner {
