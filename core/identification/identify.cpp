@@ -1108,15 +1108,19 @@ Result<Identification> identify_beside(const FoundGlide& falling, const Recordin
     search->keep_likely(0);
   }
   search->keep_best(options.most_modes, are(fates(false), Fate::steady));
-  const std::vector<DampedMode> likely = search->fit().modes();
-  const double most_rest = much_more * search->rest_energy();
-  search->remove(are(fates(must_be_known), Fate::unfit));
-  if (must_be_known && search->rest_energy() > most_rest) {
-    must_be_known = false;
-    search->fit().set_modes(likely);
+  // The modes that are left move, so some of them may become unfit.
+  for (std::size_t had = 0; search->fit().modes().size() != had;) {
+    search->converge(rate_hz);
+    const std::vector<DampedMode> likely = search->fit().modes();
+    const double most_rest = much_more * search->rest_energy();
+    had = likely.size();
     search->remove(are(fates(must_be_known), Fate::unfit));
+    if (must_be_known && search->rest_energy() > most_rest) {
+      must_be_known = false;
+      search->fit().set_modes(likely);
+      search->remove(are(fates(must_be_known), Fate::unfit));
+    }
   }
-  search->converge(rate_hz);
   std::vector<Found> kept;
   double steady_hz = 0.0;
   double steady_energy = 0.0;
