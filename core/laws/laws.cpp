@@ -32,12 +32,34 @@ constexpr bool defines(std::string_view text, std::string_view prefix, std::stri
   }
   return false;
 }
-constexpr bool is_complete(const LawFacts& law) {
-  return defines(law.faust, "", law.name) && defines(law.faust, "steady_", law.name) &&
-         defines(law.faust, "gradient_", law.name);
+
+// Returns true if the law's struct has a data member for each of these numbers.
+template <class Struct, std::size_t... i>
+constexpr bool takes_numbers(std::index_sequence<i...>) {
+  return requires {
+    Struct{static_cast<double>(i)...};
+  };
 }
-static_assert(std::all_of(table.begin(), table.end(), is_complete),
-              "the FAUST text of every law NAME defines NAME, steady_NAME and gradient_NAME");
+
+// Checks the facts of one law. The compiler names its struct with each error.
+template <class Type>
+struct CheckedFacts {
+  static constexpr const LawFacts& facts = Type::facts;
+  static_assert(defines(facts.faust, "", facts.name),
+                "the FAUST text of a law NAME must define NAME, the published force");
+  static_assert(defines(facts.faust, "steady_", facts.name),
+                "the FAUST text of a law NAME must define steady_NAME, for the passive form");
+  static_assert(defines(facts.faust, "gradient_", facts.name),
+                "the FAUST text of a law NAME must define gradient_NAME, for the passive form");
+  static_assert(!takes_numbers<typename Type::template With<double>>(
+                    std::make_index_sequence<facts.count + 1>{}),
+                "a law's `count` must be the number of its data members");
+};
+template <class... Types>
+constexpr bool are_checked(std::tuple<Types...>) {
+  return ((sizeof(CheckedFacts<Types>) > 0) && ...);
+}
+static_assert(are_checked(Laws{}));
 static_assert(std::tuple_element_t<0, Laws>::law == linear_law);
 
 }  // namespace
