@@ -128,7 +128,8 @@ struct LawFacts {
   // that contains a spring, too. The definitions may call `discrete`, `between`, `inside` and
   // `risen` (core/model/faust/faust_words.cpp) and the definitions of other laws.
   // A definition begins in column 1 with its name and `(`. All other lines are indented or begin
-  // with `with` or `}`.
+  // with `with` or `}`. A law may have more definitions, if no other law has their names. FAUST's
+  // own words, such as `sum`, cannot be names, nor names of local values.
   std::string_view faust;
 
   // Returns the index of the first argument with this role, or `count`.
@@ -160,11 +161,12 @@ struct LawFacts {
 
 // The largest slopes of a law's force; not all of them occur at the same place.
 struct Slopes {
-  double stiffness = 0.0;  // |dF/dd|
+  double stiffness = 0.0;  // |dF/dd| at v = 0
   double damping = 0.0;    // dF/dv that scales like the law's damping
   // dF/dv that scales like a stiffness; the stability proof uses only its share of `pull`
   double stiff_damping = 0.0;
-  double pull = 0.0;  // dF/dd + 2 stiff_damping at one place; the stability proof needs it
+  // dF/dd at v = 0, plus 2 stiff_damping, at one place; the stability proof needs it
+  double pull = 0.0;
 };
 
 // The facts of all laws, by Law.

@@ -44,7 +44,9 @@ enum class Law : std::uint8_t { RESSORT_EACH_LAW(RESSORT_LAW_NAME) };
 // It has these members:
 //   V force(d, v)                    the published force
 //   V potential(d)                   its slope is force(d, 0)
-//   V secant(d)                      force over distance near d, a stiffness
+//   V secant(d)                      stiffness at d: force(d, 0) over the distance from where
+//                                    the law begins to act, or its largest value. Modes that are a
+//                                    static compliance reduce the published force by it.
 //   V passive(LinkState)             the passive force of a link that acts alone
 //   Steady<V> steady(LinkState)      the part of it that does not depend on the solution
 //   Slope<V> gradient(before, step)  the rest, for a change of distance `step` in two samples
