@@ -99,7 +99,9 @@ int render_command(const RenderOptions& options, bool is_quiet) {
     const bool was_asked = is_flight_name(options.name) || !options.score.empty() ||
                            !options.input.empty() || !options.midi.empty();
     if (rendered->peak == 0.0 && rendered->frames > 0 && !was_asked) {
-      print_error("the output is silent: nothing excites the model; pass --score or --input");
+      print_error(
+          "the output is silent: no motion reaches it; pass --score or --input, or --motion"
+          " if a mass should start with a velocity");
     }
   }
   if (rendered->resets > 0) {
