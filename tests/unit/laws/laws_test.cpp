@@ -248,6 +248,25 @@ TEST_CASE("no law exerts a force beyond its reach", "[laws]") {
   });
 }
 
+// A contact does not act at a distance of -1 or less, as no reach here exceeds 1.
+TEST_CASE("a law whose zone is everywhere acts on both sides of 0", "[laws]") {
+  each_law([&](auto type, Random& random) {
+    int acts_above = 0;
+    int acts_below = 0;
+    for (int i = 0; i < draws; ++i) {
+      const auto law = law_with<decltype(type)>(any_arguments(type.facts, random));
+      const double d = random.uniform(1.0, 2.0);
+      const double v = random.uniform(-0.3, 0.3);
+      acts_above += law.force(d, v) != 0.0;
+      acts_below += law.force(-d, v) != 0.0;
+    }
+    if (type.facts.zone == Zone::everywhere) {
+      CHECK(acts_above > 0);
+      CHECK(acts_below > 0);
+    }
+  });
+}
+
 TEST_CASE("the ends of an odd law may be exchanged", "[laws]") {
   each_law([&](auto type, Random& random) {
     int differs = 0;
@@ -315,6 +334,25 @@ TEST_CASE("the passive force of every law is its steady part and its gradient", 
       CAPTURE(link.now, link.speed, link.free, link.gamma, way);
       CHECK(f == Approx(parts).margin(1e-9));
     }
+  });
+}
+
+TEST_CASE("the slope of every gradient is that of its value", "[laws]") {
+  // Central differences with steps of 1e-6 err by 1e-12 times the third derivative and by rounding
+  // of 1e-16/1e-6. The corner of a force lies between the two for one step of 10^5.
+  constexpr double h = 1e-6;
+  each_law([&](auto type, Random& random) {
+    int wrong = 0;
+    for (int i = 0; i < draws; ++i) {
+      const auto law = law_with<decltype(type)>(any_arguments(type.facts, random));
+      const double before = random.uniform(-1.0, 1.0);
+      const double step = random.uniform(0.05, 0.5) * (i % 2 == 0 ? 1.0 : -1.0);
+      const double by_step =
+          (law.gradient(before, step + h).value - law.gradient(before, step - h).value) / (2.0 * h);
+      wrong +=
+          std::fabs(law.gradient(before, step).slope - by_step) > 1e-6 * (1.0 + std::fabs(by_step));
+    }
+    CHECK(wrong <= 1);
   });
 }
 
