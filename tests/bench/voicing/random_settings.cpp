@@ -217,12 +217,20 @@ int play_random_settings(Player& player, const std::string& name, int count, std
     }
     if (setting.has_move && !preset.noise) {  // noise consists of steps only
       double step_db = decibels(step_at(sound, move_s) / std::max(peak, 1e-9));
-      if (step_db > most_step_db) {
-        // Played twice, because strokes from two sides alternate.
-        player.play(setting.unmoved(), move_s + 0.1);
-        const Stereo unmoved = player.play(setting.unmoved(), move_s + 0.1);
-        step_db = decibels(step_at(sound.part(0.0, move_s + 0.1), unmoved, move_s) /
-                           std::max(peak, 1e-9));
+      // A lever's click comes with every stroke, a slip of the bow at the same time does not.
+      Stereo moved = sound.part(0.0, move_s + 0.1);
+      for (int stroke = 0; stroke < 3 && step_db > most_step_db; ++stroke) {
+        const auto play_again = [&](const std::vector<TimedEvent>& events) {
+          // Played twice, because strokes from two sides alternate.
+          player.play(events, move_s + 0.1);
+          return player.play(events, move_s + 0.1);
+        };
+        if (stroke > 0) {
+          moved = play_again(setting.events);
+        }
+        const double again_db =
+            decibels(step_at(moved, play_again(setting.unmoved()), move_s) / std::max(peak, 1e-9));
+        step_db = stroke == 0 ? again_db : std::min(step_db, again_db);
       }
       expect(step_db <= most_step_db, "a step", step_db);
     }
