@@ -120,7 +120,8 @@ class Stability {
   double stiffness_factor(const ParameterBox& box);
   // Returns such a factor from the edge bound: max over links of (d_i/m_i + d_j/m_j) < 3.92, where
   // d is the sum of k + 2z at a mass. Not above 0 if the dampers alone are too strong; most_bounded
-  // if nothing limits it. At most two times too small if no place is live. O(masses + links)
+  // if nothing limits it; 0 if the assembly is incomplete. At most two times too small if no place
+  // is live. O(masses + links)
   double bounded_stiffness_factor(const ParameterBox& box);
 
  private:
