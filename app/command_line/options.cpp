@@ -82,9 +82,7 @@ void add_motion(CLI::App& command, std::optional<ThirdArgument>& third) {
 void add_method(CLI::App& command, std::optional<Method>& method) {
   std::vector<std::string> words = {"auto"};
   std::string all = "auto";
-  std::vector<Method> methods = published_methods();
-  methods.push_back(Method::oversampled);
-  for (const Method known : methods) {
+  for (const Method known : all_methods()) {
     words.emplace_back(method_name(known));
     all += ", " + words.back();
   }

@@ -105,13 +105,19 @@ std::optional<Method> method_named(std::string_view name) {
   return row == std::end(rows) ? std::nullopt : std::optional(row->method);
 }
 
-std::vector<Method> published_methods() {
+std::vector<Method> all_methods() {
   std::vector<Method> methods = {Method::direct};
   for (const KernelRow& row : rows) {
-    if (row.method != Method::direct && row.method != Method::oversampled) {
+    if (row.method != Method::direct) {
       methods.push_back(row.method);
     }
   }
+  return methods;
+}
+
+std::vector<Method> published_methods() {
+  std::vector<Method> methods = all_methods();
+  std::erase(methods, Method::oversampled);
   return methods;
 }
 

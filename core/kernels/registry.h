@@ -54,8 +54,10 @@ std::string_view method_name(Method method);
 // Returns nothing if no method has that name.
 std::optional<Method> method_named(std::string_view name);
 
-// Returns the methods that compute the published scheme, possibly in other coordinates, the
-// reference first. `oversampled` approximates the continuous network better.
+// Returns every method, the reference first.
+std::vector<Method> all_methods();
+// Returns the same without `oversampled`, which approximates the continuous network better; the
+// others compute the published scheme, possibly in other coordinates.
 std::vector<Method> published_methods();
 
 // Returns the operations per sample of all voices in the Program's form, with all contacts closed

@@ -67,10 +67,9 @@ const char* precision_name(Precision precision) {
 
 std::vector<Way> all_ways() {
   std::vector<Way> ways;
-  for (const Method method : published_methods()) {
+  for (const Method method : all_methods()) {
     add_method(ways, method);
   }
-  add_method(ways, Method::oversampled);
   add_truncation(ways, "modal cents=1", Method::modal, "cents=1", silences);
   add_truncation(ways, "modal", Method::modal, "", silences);
   for (const NamedBudget& asked : plans_choice) {

@@ -77,11 +77,9 @@ std::vector<Scene> scenes_with_taps() {
 
 TEST_CASE("the drawing matches the render for every kernel", "[panel]") {
   std::set<Method> seen;
-  std::vector<Method> methods = published_methods();
-  methods.push_back(Method::oversampled);
   for (const Scene& scene : scenes_with_taps()) {
     const Network network = network_of(scene.text);
-    for (const Method method : methods) {
+    for (const Method method : all_methods()) {
       for (const Precision precision : {Precision::float64, Precision::float32}) {
         Player player(scene.text, struck(1), {.precision = precision, .method = method});
         seen.insert(player.compiled.plan.parts[0].method);
