@@ -112,17 +112,6 @@ class alignas(64) InputDriver {
   double value() const { return value_; }
   double target() const { return target_; }
 
-  InputSample next_position() {
-    InputSample sample;
-    fill_positions(1, 1, &sample.value, &sample.velocity);
-    return sample;
-  }
-  InputSample next_force() {
-    InputSample sample;
-    fill_forces(1, 1, &sample.value);
-    return sample;
-  }
-
   // Writes the next positions, `step` apart in memory.
   template <class T>
   void fill_positions(std::size_t frames, std::size_t step, T* value, T* velocity) {
