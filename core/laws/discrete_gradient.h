@@ -42,6 +42,12 @@ struct Slope {
   V slope;
 };
 
+// The same with the second derivative.
+template <class V>
+struct Curve : Slope<V> {
+  V curvature;
+};
+
 // The part of a passive force that does not depend on the solution: a constant force, and a damping
 // per unit of the change of distance in two samples.
 template <class V>
@@ -56,43 +62,57 @@ static constexpr Scalar<V> tiny_share() {
   return sizeof(Scalar<V>) == 4 ? Scalar<V>(0x1p-22) : Scalar<V>(0x1p-51);
 }
 
-// After a shorter step, relative to the distances, the error of Newton's method is its square,
-// which is less than rounding.
+// After a shorter step, relative to the distances, the error of Newton's method is its square, and
+// that of Chebyshev's its third power, which is less than rounding.
 template <class V>
-static constexpr Scalar<V> last_newton_step() {
-  return sizeof(Scalar<V>) == 4 ? Scalar<V>(0x1p-14) : Scalar<V>(0x1p-34);
+static constexpr Scalar<V> last_step(bool is_curved) {
+  return sizeof(Scalar<V>) == 4 ? Scalar<V>(is_curved ? 0x1p-10 : 0x1p-14)
+                                : Scalar<V>(is_curved ? 0x1p-24 : 0x1p-34);
 }
 
 inline constexpr int most_newton_steps = 48;
 
 // Returns the f = g(after) that solves after + gamma g(after) = free between `far` and `free`.
-// Safeguarded Newton's method: a step that would leave the bracket, or where g falls too steeply,
-// is replaced by bisection. Lanes that have converged do not change any more, so that the result of
-// a lane does not depend on the others.
+// Safeguarded Newton's method, or Chebyshev's if g returns a Curve: a step that would leave the
+// bracket, or where g falls too steeply, is replaced by bisection. The force is that of the last
+// tangent or parabola. Lanes that have converged do not change any more, so that the result of a
+// lane does not depend on the others.
 template <class V, class Force>
 static inline V force_between(V far, V start, V free, V gamma, Force&& g) {
+  constexpr bool is_curved = requires {
+    g(free).curvature;
+  };
   const V one = V{} + 1;
   V low = select(far < free, far, free);
   V high = select(far < free, free, far);
   V after = select(start < low, low, select(start > high, high, start));
+  V force = after - after;  // NaN stays NaN
   auto live = after == after;
   for (int i = 0; i < most_newton_steps && any_of(live); ++i) {
-    const Slope<V> here = g(after);
+    const auto here = g(after);
     const V over = after - free + gamma * here.value;
     low = select(over < V{}, after, low);
     high = select(over < V{}, high, after);
     const V steep = one + gamma * here.slope;
-    const V newton = after - over / steep;
+    const V yield = one / steep;
+    V step = over * yield;
+    V tangent = here.slope;
+    if constexpr (is_curved) {
+      const V bend = step * here.curvature / 2;
+      const V more = bend * gamma * yield;
+      step += select(absolute(more) < one / 2, more * step, V{});
+      tangent -= here.curvature * step / 2;
+    }
+    const V newton = after - step;
+    force = select(live, here.value - tangent * step, force);
     const V next =
         select((newton >= low) & (newton <= high) & (steep > V{}), newton, (low + high) / 2);
     const auto is_moving =
-        absolute(next - after) > last_newton_step<V>() * (absolute(after) + absolute(free));
+        absolute(next - after) > last_step<V>(is_curved) * (absolute(after) + absolute(free));
     after = select(live, next, after);
     live = live & is_moving;
   }
-  const Slope<V> here = g(after);
-  const V over = after - free + gamma * here.value;
-  return here.value - here.slope * over / (one + gamma * here.slope);
+  return force;
 }
 
 // Does the same for a g that never falls, whose largest value in the bracket is g(free). The first

@@ -44,7 +44,7 @@ with {
 
   V force(V, V v) const {
     using T = Scalar<V>;
-    const V ratio = slip(v);
+    const V ratio = slip(v * per_scale());
     return z * v * T(0.63) * exponential(V{} - 4 * ratio * ratio + T(0.5));
   }
   V potential(V) const { return V{}; }
@@ -54,17 +54,20 @@ with {
   Steady<V> steady(const LinkState<V>&) const { return {V{}, V{}}; }
   Slope<V> gradient(V, V step) const { return rubbing(*this, step); }
 
-  Slope<V> friction(V v) const {
+  Curve<V> friction(V v) const { return friction(v, per_scale()); }
+  Curve<V> friction(V v, V per_scale) const {
     using T = Scalar<V>;
-    const V ratio = slip(v);
-    const V grip = T(0.63) * z * exponential(T(0.5) - 4 * ratio * ratio);
-    return {grip * v, grip * (1 - 8 * ratio * ratio)};
+    const V ratio = slip(v * per_scale);
+    const V square = ratio * ratio;
+    const V grip = T(0.63) * z * exponential(T(0.5) - 4 * square);
+    return {{grip * v, grip * (1 - 8 * square)}, 8 * grip * per_scale * ratio * (8 * square - 3)};
   }
 
-  // Returns the friction f(v) at the speed v that solves v + half f(v) = wanted, by Newton's method
-  // from the speed `last`.
+  // Returns the friction f(v) at the speed v that solves v + half f(v) = wanted, by Chebyshev's
+  // method from the speed `last`.
   V grip(V wanted, V last, V half) const {
-    return force_between(V{}, last, wanted, half, [&](V v) { return friction(v); });
+    const V once = per_scale();
+    return force_between(V{}, last, wanted, half, [&](V v) { return friction(v, once); });
   }
 
   static Slopes steepest(const SmoothBow&, const SmoothBow& most, double) {
@@ -72,11 +75,15 @@ with {
   }
   static Slopes gentlest(const SmoothBow& least) { return {.damping = std::min(0.0, least.z)}; }
 
-  // Returns |v|/s, clamped to 1000, where the friction is 0. This also covers s = 0.
-  V slip(V v) const {
+  // Returns 1/s, or a large number for s = 0.
+  V per_scale() const {
+    const V least = V{} + Scalar<V>(1e-30);
+    return 1 / select(absolute(s) > least, s, least);
+  }
+  // Returns v/s, clamped to 1000, where the friction is 0.
+  static V slip(V ratio) {
     const V most = V{} + 1000;
-    const V ratio = absolute(v / s);
-    return select(ratio < most, ratio, most);
+    return select(absolute(ratio) < most, ratio, most);
   }
 
   V z;
