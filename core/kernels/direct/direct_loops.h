@@ -161,8 +161,8 @@ struct Passive {
   }
   // Returns the displacement of node `at` by a unit force on node `from` in one sample.
   V give(std::uint32_t from, std::uint32_t at) const {
-    if (from == at && !is_place(program, at)) {
-      return inverse_mass(at);
+    if (!is_place(program, from) && !is_place(program, at)) {
+      return from == at ? inverse_mass(at) : V{};
     }
     return give_of_places(from, at);
   }

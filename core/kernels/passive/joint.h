@@ -113,6 +113,9 @@ class JointOf final : public JointBody<V> {
   V coupling(Ends one, Ends other) const override {
     if constexpr (requires { body_.coupling(one, other); }) {
       return body_.coupling(one, other);
+    } else if constexpr (requires { body_.give(0u, 0u); }) {
+      return body_.give(one.a, other.a) + body_.give(one.b, other.b) - body_.give(one.a, other.b) -
+             body_.give(one.b, other.a);
     } else {
       const auto [a, b] = one;
       const auto [c, d] = other;
