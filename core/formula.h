@@ -125,7 +125,7 @@ inline double evaluate(std::span<const Step> formula, std::span<const double> pa
         left /= right;
         break;
       case Op::power:
-        left = std::pow(left, right);
+        left = right == 2.0 ? left * left : std::pow(left, right);
         break;
       case Op::minimum:
         left = std::min(left, right);

@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "core/engine/mix.h"
@@ -18,15 +20,22 @@ namespace ressort::engine {
 // The kernels of one part of the machine. Each kernel steps `width` voices.
 template <class T>
 struct PartBank {
-  PartBank(const Program& program_in, std::size_t voices, Isa isa, const Progress& progress)
+  PartBank(const Program& program_in, std::span<const double> parameters, std::size_t voices,
+           Isa isa, const Progress& progress)
       : program(program_in) {
     do {
       progress.spend(4 * program.position.size() + program.ends.size());
       kernels.push_back(make_kernel<T>(program, voices, isa));
       width = kernels[0]->width();
     } while (kernels.size() * width < voices);
-    untuned.resize(kernels.size() * width * program.coefficients.size());
-    is_known.resize(kernels.size() * width);
+    is_stale.resize(program.coefficients.size());
+    for (std::size_t voice = 0; voice < kernels.size() * width; ++voice) {
+      evaluated_from.insert(evaluated_from.end(), parameters.begin(), parameters.end());
+      for (const Coefficient& coefficient : program.coefficients) {
+        untuned.push_back(voice == 0 ? untuned_value(program, coefficient, parameters)
+                                     : untuned[untuned.size() - program.coefficients.size()]);
+      }
+    }
     last.resize(kernels.size() * row());
     before.resize(last.size());
     slope.resize(last.size());
@@ -44,17 +53,34 @@ struct PartBank {
       slope[at] = static_cast<T>(program.velocity[node] / program.rate_ratio);
     }
   }
-  // Returns the value of a coefficient in a voice. If `is_unturned`, the parameters have not
-  // changed since the last call. [audio]
+  // Evaluates the coefficients of a voice that depend on parameters that have changed. [audio]
+  void evaluate(std::size_t voice, std::span<const double> parameters) {
+    double* const from = evaluated_from.data() + voice * parameters.size();
+    bool has_changed = false;
+    for (std::size_t i = 0; i < parameters.size(); ++i) {
+      if (std::exchange(from[i], parameters[i]) != parameters[i]) {
+        for (const std::uint32_t c : program.depending[i]) {
+          has_changed = is_stale[c] = true;
+        }
+      }
+    }
+    for (std::uint32_t c = 0; has_changed && c < program.coefficients.size(); ++c) {
+      if (is_stale[c]) {
+        untuned[voice * program.coefficients.size() + c] =
+            untuned_value(program, program.coefficients[c], parameters);
+        is_stale[c] = false;
+      }
+    }
+  }
+  // Returns the value of a coefficient in a voice for the parameters that were evaluated. [audio]
   double value(std::size_t voice, std::uint32_t c, std::span<const double> parameters,
-               double stiffness_factor, bool is_unturned) {
+               double stiffness_factor) const {
     const Coefficient& coefficient = program.coefficients[c];
     if (coefficient.mode != no_mode && !program.form.is_continuous()) {
       return sampled_value(program, coefficient, parameters, stiffness_factor);
     }
-    double& value = untuned[voice * program.coefficients.size() + c];
-    value = is_unturned ? value : untuned_value(program, coefficient, parameters);
-    return tuned_value(program, coefficient, value, stiffness_factor);
+    return tuned_value(program, coefficient, untuned[voice * program.coefficients.size() + c],
+                       stiffness_factor);
   }
   T* last_of(std::size_t voice) { return last.data() + voice / width * row(); }
   // size of an output row of one kernel
@@ -66,8 +92,9 @@ struct PartBank {
   std::size_t width = 1;
   std::vector<std::unique_ptr<Kernel<T>>> kernels;  // [voice / width]
   std::vector<double> untuned;  // [voice][coefficient] before the stiffness factor (untuned_value)
-  std::vector<bool> is_known;   // [voice] `untuned` is up to date
-  Aligned<T> last;              // [kernel][output][lane] last sample
+  std::vector<double> evaluated_from;  // [voice][parameter] values that gave `untuned`
+  std::vector<bool> is_stale;          // [coefficient] has to be evaluated
+  Aligned<T> last;                     // [kernel][output][lane] last sample
   // The position and the velocity in the last sample, for outputs of derivatives.
   Aligned<T> before;  // [kernel][output][lane]
   Aligned<T> slope;   // [kernel][output][lane]
@@ -110,7 +137,8 @@ struct Bank {
     std::size_t outputs_of_one = 0;
     std::size_t nodes = 0;
     for (const Program& program : machine.parts) {
-      const std::size_t width = parts.emplace_back(program, voices, isa, progress).width;
+      const std::size_t width =
+          parts.emplace_back(program, machine.parameters, voices, isa, progress).width;
       inputs = std::max(inputs, width * program.inputs.size());
       most_inputs = std::max(most_inputs, program.inputs.size());
       audio_coefficients = std::max(audio_coefficients, width * program.audio_coefficients.size());

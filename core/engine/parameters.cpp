@@ -204,21 +204,18 @@ void Parameters::apply(Bank<T>& bank, const Voices& voices, EnergyWatch& watch) 
       }
       watch.mark_driven(voice, lane, group.part);
       const bool ramped = !voice.is_new && !playing_.bare;
-      const auto set = [&](std::uint32_t c, bool is_known) {
+      part.evaluate(lane, values_in(lane));
+      const auto set = [&](std::uint32_t c) {
         kernel.coefficients.set(lane - group.first, c,
-                                part.value(lane, c, values_in(lane), voice.factor, is_known),
-                                ramped);
+                                part.value(lane, c, values_in(lane), voice.factor), ramped);
       };
       const auto set_depending = [&](std::uint16_t parameter) {
-        std::for_each(depending[parameter].begin(), depending[parameter].end(),
-                      [&](std::uint32_t c) { set(c, false); });
+        std::for_each(depending[parameter].begin(), depending[parameter].end(), set);
       };
-      const bool is_known = part.is_known[lane] && !voice.is_new;
       for (std::uint32_t c = 0; is_tuned && c < part.program.coefficients.size(); ++c) {
-        set(c, is_known);
+        set(c);
       }
-      part.is_known[lane] = (is_known || is_tuned) && part.program.audio_coefficients.empty();
-      if (is_known || !is_tuned) {
+      if (!is_tuned) {
         std::for_each(turned_.begin(), turned_.end(), set_depending);
         std::for_each(swung_.begin(), swung_.end(), set_depending);
       }

@@ -125,6 +125,30 @@ TEST_CASE("a bend keeps the values of its key", "[curves]") {
                         key_hz(86))) < 0.05);
 }
 
+TEST_CASE("a voice that slept has the values of its next key and of a knob turned meanwhile",
+          "[curves]") {
+  Preset preset = with_curve();
+  preset.damper_s = 0.01;
+  const auto played_after = [&](const std::vector<Event>& before) {
+    Player player(stiff_string, preset);
+    player.run(4410, before);
+    player.run(22050, {note_off(0, 40)});
+    player.run(100, {parameter(0, 0, 3e-3)});
+    player.run(2 * 44100, {note_on(0, 84)});
+    return std::vector<double>(player.y().end() - 2 * 44100, player.y().end());
+  };
+  const auto fresh = played_after({});
+  const auto later = played_after({note_on(0, 40)});
+  double off = 0.0;
+  for (std::size_t n = 0; n < fresh.size(); ++n) {
+    off = std::max(off, std::fabs(later[n] - fresh[n]));
+  }
+  CHECK(off < 1e-12 * peak(fresh));
+  const double first = key_hz(84) * std::sqrt((1.0 + 3e-2) / (1.0 + 1e-2));
+  CHECK(std::fabs(cents(interval(fresh, first, 3e-2),
+                        2.0 * std::sqrt((1.0 + 0.12) / (1.0 + 0.03)))) < 0.1);
+}
+
 TEST_CASE("a strike's velocity changes its own voice, and a re-strike changes it again",
           "[curves]") {
   Preset preset = with_curve();
