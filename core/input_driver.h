@@ -135,7 +135,13 @@ class alignas(64) InputDriver {
   template <class T>
   void fill_forces(std::size_t frames, std::size_t step, T* force) {
     for_parts(frames, [&](std::size_t first, std::size_t end, const double* pulses) {
-      for (std::size_t n = first; n < end; ++n) {
+      std::size_t n = first;
+      if (motion_ != Motion::follow && held_frames_ == 0 && pulses != nullptr) {
+        for (const double value = value_; n < end; ++n) {
+          force[n * step] = static_cast<T>(value + pulses[n - first]);
+        }
+      }
+      for (; n < end; ++n) {
         if (motion_ == Motion::follow) {
           approach();
         }
@@ -181,14 +187,14 @@ class alignas(64) InputDriver {
       return;
     }
     constexpr double inaudible = 1e-5;  // -100 dB of the burst's start
-    double noise[most_pulses];
-    burst_noise_.fill(frames, noise);
+    const double level = burst_;
+    const double kept = burst_kept_;
     double left = burst_left_;
-    for (std::size_t n = 0; n < frames && left > 0.0; ++n) {
-      pulses[n] += burst_ * left * noise[n];
-      left *= burst_kept_;
+    burst_noise_.each(frames, [&](std::size_t n, double sample) {
+      pulses[n] += level * left * sample;
+      left *= kept;
       left = left < inaudible ? 0.0 : left;
-    }
+    });
     burst_left_ = left;
   }
 

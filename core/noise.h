@@ -43,11 +43,13 @@ class BandNoise {
     gain_ = std::sqrt(0.5 * (1.0 - product_) / variance_of_white);
   }
   double next() {
-    double sample;
-    fill(1, &sample);
+    double sample = 0.0;
+    each(1, [&](std::size_t, double only) { sample = only; });
     return sample;
   }
-  void fill(std::size_t count, double* samples) {
+  // Calls use(n, sample) for the next samples.
+  template <class Use>
+  void each(std::size_t count, Use&& use) {
     RandomNumbers white = white_;
     double x1 = x1_;
     double x2 = x2_;
@@ -56,7 +58,7 @@ class BandNoise {
     for (std::size_t n = 0; n < count; ++n) {
       const double x = white.next();
       const double y = (gain_ * (x - x2) - product_ * y2) + sum_ * y1;
-      samples[n] = y;
+      use(n, y);
       x2 = std::exchange(x1, x);
       y2 = std::exchange(y1, y);
     }
