@@ -502,27 +502,33 @@ struct ModalPlayer {
     T sum = s.forces.still[number] +
             (Crossed ? read<Crossed>(s, row)
                      : along(s, row, s.motion.q) + along(s, row + s.shapes.stride, s.motion.d));
-    sum += force_of_inputs(force, n);
+    add_force_of_inputs(force, n, 1, &sum);
     for (const ModalForce::Weight& end : force.ends) {
       sum += static_cast<T>(end.weight) * (s.ends.force[end.of] + s.ends.exerted[end.of]);
     }
     return static_cast<T>(force.scale) * sum;
   }
 
-  // Returns the part of such a force that the inputs exert.
-  T force_of_inputs(const ModalForce& force, std::size_t n) const {
-    T sum = 0;
-    const T* const value = block.value + n * inputs;
-    const T* const velocity = block.velocity + n * inputs;
+  // Adds the part of such a force that the inputs exert, in some samples.
+  void add_force_of_inputs(const ModalForce& force, std::size_t first, std::size_t frames,
+                           T* sums) const {
+    const T* const value = block.value + first * inputs;
+    const T* const velocity = block.velocity + first * inputs;
     for (const ModalForce::Hand& hand : force.hands) {
-      sum += static_cast<T>(hand.weight) *
-             (coefficient(hand.stiffness) * (value[hand.input] - static_cast<T>(hand.start)) +
-              coefficient(hand.damping) * velocity[hand.input]);
+      const T k = static_cast<T>(hand.weight) * coefficient(hand.stiffness);
+      const T z = static_cast<T>(hand.weight) * coefficient(hand.damping);
+      const T start = static_cast<T>(hand.start);
+      for (std::size_t n = 0; n < frames; ++n) {
+        const std::size_t at = n * inputs + hand.input;
+        sums[n] += k * (value[at] - start) + z * velocity[at];
+      }
     }
     for (const ModalForce::Weight& input : force.inputs) {
-      sum += static_cast<T>(input.weight) * value[input.of];
+      const T weight = static_cast<T>(input.weight);
+      for (std::size_t n = 0; n < frames; ++n) {
+        sums[n] += weight * value[n * inputs + input.of];
+      }
     }
-    return sum;
   }
 
   // --- free motion ----------------------------------------------------------------------------
@@ -732,14 +738,21 @@ struct ModalPlayer {
                        std::size_t first, std::size_t frames) {
     const bool has_damped = has_damped_row(number);
     const T* const damped = seen + max_block_frames;
-    T before = has_damped ? s.forces.before[number] : T(0);
-    for (std::size_t n = 0; n < frames; ++n, out += outputs) {
-      T sum = s.forces.still[number] + seen[n];
-      if (has_damped) {
-        sum += damped[n] - before;
-        before = damped[n];
+    const T still = s.forces.still[number];
+    T sums[max_block_frames];
+    for (std::size_t n = 0; n < frames; ++n) {
+      sums[n] = still + seen[n];
+    }
+    if (has_damped) {
+      sums[0] += damped[0] - s.forces.before[number];
+      for (std::size_t n = 1; n < frames; ++n) {
+        sums[n] += damped[n] - damped[n - 1];
       }
-      *out = static_cast<T>(force.scale) * (sum + force_of_inputs(force, first + n));
+    }
+    add_force_of_inputs(force, first, frames, sums);
+    const T scale = static_cast<T>(force.scale);
+    for (std::size_t n = 0; n < frames; ++n) {
+      out[n * outputs] = scale * sums[n];
     }
     return seen + (has_damped ? 2 : 1) * max_block_frames;
   }
