@@ -365,7 +365,6 @@ void ModalKernel<T>::wake_all() {
   state_.sleep.awake = modes_.modes;
   state_.sleep.swept = state_.shapes.modes;
   state_.sleep.until_check = check_frames;
-  state_.sleep.is_long_check = false;
 }
 
 template <class T>

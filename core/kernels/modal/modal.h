@@ -16,9 +16,8 @@
 
 namespace ressort::kernels {
 
-// interval between two checks for modes that may sleep...
-inline constexpr std::uint32_t check_frames = 32;
-inline constexpr std::uint32_t long_check_frames = 128;  // ...while few are awake
+// interval between two checks for modes that may sleep
+inline constexpr std::uint32_t check_frames = 256;
 
 // Largest number of passive links that modal_straight.h solves: the lanes of the widest pack.
 inline constexpr std::size_t most_straight = widest_bytes / sizeof(float);
@@ -74,7 +73,6 @@ struct ModalSleepPace {
   std::size_t awake = 0;  // modes [0, awake) are awake
   std::size_t swept = 0;  // the same in whole pairs of packs
   std::uint32_t until_check = check_frames;
-  bool is_long_check = false;
 };
 template <class T>
 struct ModalSleep : ModalSleepPace {

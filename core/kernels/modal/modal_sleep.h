@@ -20,23 +20,11 @@ namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 // Squaring r^2 this many times gives r^check_frames.
-constexpr std::size_t check_doublings = 4;
+constexpr std::size_t check_doublings = 7;
 static_assert(std::size_t{2} << check_doublings == check_frames);
-constexpr std::size_t long_check_doublings = 2;
-static_assert(check_frames << long_check_doublings == long_check_frames);
-constexpr std::size_t few_modes = 16;
 
 constexpr double least_ringing = 1e-4;  // share of lK; modes nearer to critical damping never sleep
 constexpr double endless = 1e15;        // amplitude of a mode that does not ring, for a state of 1
-
-// Returns the decay in an interval as long as the last one, from the decay `kept` in a short one.
-template <class V, class T>
-V after_check(const ModalState<T>& s, V kept) {
-  for (std::size_t i = 0; s.sleep.is_long_check && i < long_check_doublings; ++i) {
-    kept *= kept;
-  }
-  return kept;
-}
 
 template <class T>
 const T* listener(const ModalState<T>& s, std::size_t places, std::size_t l) {
@@ -104,7 +92,7 @@ void measure_room(ModalState<T>& s, std::size_t places, std::size_t listeners) {
       owed += absolute(packs(row)[i]) * packs(s.sleep.debt)[i];
     }
     const T now = std::sqrt(total<T>(loud) / 2);
-    const T lately = after_check(s, s.sleep.lately_kept) * s.sleep.loudness[l];
+    const T lately = s.sleep.lately_kept * s.sleep.loudness[l];
     s.sleep.loudness[l] = now > lately ? now : lately;
     // The measured peak may be too small by the share that sleeps.
     const T share = s.sleep.silence * (1 - s.sleep.silence);
@@ -137,7 +125,7 @@ void stay_awake(ModalState<T>& s, std::size_t modes) {
 template <class T>
 void check_sleep(ModalState<T>& s, std::size_t places, std::size_t listeners) {
   for (std::size_t i = 0; i < all_packs(s); ++i) {
-    packs(s.sleep.debt)[i] *= after_check(s, packs(s.sleep.decay)[i]);
+    packs(s.sleep.debt)[i] *= packs(s.sleep.decay)[i];
   }
   measure_amplitudes(s);
   measure_room(s, places, listeners);
@@ -148,7 +136,6 @@ void check_sleep(ModalState<T>& s, std::size_t places, std::size_t listeners) {
     s.motion.q[mode] = s.motion.d[mode] = s.saved.q[mode] = s.saved.d[mode] = 0;
   }
   stay_awake(s, awake);
-  s.sleep.is_long_check = awake <= few_modes;
 }
 
 }  // namespace

@@ -71,7 +71,7 @@ struct ModalPlayer {
     if (s.inputs.pushing == 0 && !is_held()) {
       check_sleep(s, places, places + outputs);
     }
-    s.sleep.until_check = s.sleep.is_long_check ? long_check_frames : check_frames;
+    s.sleep.until_check = check_frames;
   }
 
   void play_steady(std::size_t first, std::size_t frames) {
@@ -763,7 +763,6 @@ struct ModalPlayer {
     if (s.sleep.awake < modes.modes) {
       stay_awake(s, modes.modes);
       s.sleep.until_check = check_frames;
-      s.sleep.is_long_check = false;
     }
   }
   // Returns whether a link exerted a force in the last sample.

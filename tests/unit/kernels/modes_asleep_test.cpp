@@ -14,6 +14,9 @@ using support::KernelRunner;
 using support::network_of;
 using support::show;
 
+// All modes are awake until the first check after a blow; the share of a second that it lasts.
+constexpr double share_of_first_check = check_frames / 44100.0;
+
 std::string model(const std::string& name) {
   std::ifstream file(std::string(RESSORT_SOURCE) + "/models/" + name);
   std::stringstream text;
@@ -129,7 +132,7 @@ double reach_of_a_blow(const std::string& text) {
   return most;
 }
 
-TEST_CASE("A struck mesh keeps twelve of six hundred modes awake", "[modes_asleep]") {
+TEST_CASE("A struck mesh keeps ten of six hundred modes awake", "[modes_asleep]") {
   const std::string struck = model("20x30mesh.mdl");
   const double reach = reach_of_a_blow(struck);
   for (const Isa isa : isas()) {
@@ -141,7 +144,7 @@ TEST_CASE("A struck mesh keeps twelve of six hundred modes awake", "[modes_aslee
                  << " of " << show(mesh.peak()) << ", at most " << show(mesh.most_owed()) << ", "
                  << isa_name(isa));
     CHECK(mesh.form().of > 590);
-    CHECK(mesh.mean_awake() <= 12.0);
+    CHECK(mesh.mean_awake() <= 10.0 + share_of_first_check * static_cast<double>(mesh.modes()));
     CHECK(mesh.excess() < 1e-12);
     CHECK(mesh.worst() > 0.0);
     CHECK(mesh.most_owed() + mesh.form().left_out * reach <= 1e-3 * reach);
@@ -233,7 +236,7 @@ TEST_CASE("Sleeping modes keep the bound in float and in double", "[modes_asleep
   Pair<float> mesh(model("20x30mesh.mdl"), -60.0);
   mesh.play({{1.0}});
   mesh.rest(44099);
-  CHECK(mesh.mean_awake() <= 12.0);
+  CHECK(mesh.mean_awake() <= 10.0 + share_of_first_check * static_cast<double>(mesh.modes()));
   CHECK(mesh.excess() < 1e-6 * mesh.peak());
 }
 
@@ -264,7 +267,9 @@ TEST_CASE("Exact modes sleep, too", "[modes_asleep]") {
     }
     sum += 60.0 * static_cast<double>(kernel.awake().modes);
   }
-  CHECK(sum / 44100.0 < 14.0);
+  const double all = static_cast<double>(sleepy.form.get<Modes>().modes);
+  CHECK(sum / 44100.0 <
+        12.0 + 2.0 * share_of_first_check * all);  // a blow and a turned knob wake all
 }
 
 TEST_CASE("Without a budget no mode sleeps", "[modes_asleep]") {
