@@ -54,7 +54,7 @@ judge() {
       sees["core/solids"] = "core core/linear_algebra core/solids"
       sees["core/kernels"] = "core/rooms.h core/lanes.h core/groups.h core/sampled_mode.h core/waveguide_places.h core/formula.h core/progress.h core/model/preset/budget.h " \
                              "core/laws core/linear_algebra core/kernels"
-      sees["core/engine"] = "core/rooms.h core/lanes.h core/curve.h core/formula.h core/progress.h core/gesture.h core/stroke.h " \
+      sees["core/engine"] = "core/rooms.h core/lanes.h core/curve.h core/formula.h core/progress.h core/gesture.h core/stroke.h core/precision.h " \
                             "core/input_driver.h core/random.h core/noise.h core/lfo.h core/midi_number.h core/laws core/kernels core/engine"
       sees["core/compile"] = "core core/laws core/linear_algebra core/model core/analysis core/kernels " \
                              "core/engine core/compile"
@@ -105,7 +105,7 @@ judge() {
         target = what
         if (match(target, /^(core|app)\/[^\/]*\//)) {
           target = substr(target, 1, RLENGTH - 1)
-        } else if (target ~ /^core\/(rooms|ranges|format|result|formula|progress|groups|lanes|curve|sampled_mode|waveguide_places|raised_cosine|gesture|stroke|input_driver|random|noise|lfo|controller|knob_range|midi_number)[.]h$/) {
+        } else if (target ~ /^core\/(rooms|ranges|format|result|formula|progress|groups|lanes|curve|sampled_mode|waveguide_places|raised_cosine|gesture|stroke|precision|input_driver|random|noise|lfo|controller|knob_range|midi_number)[.]h$/) {
           target = "core"
         } else if (target ~ /^app\/[^\/]*$/) {
           target = "app"

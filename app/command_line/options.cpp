@@ -119,10 +119,14 @@ void add_no_rescale(CLI::App& command, bool& rescale) {
       "do not convert the model's numbers from 44100 Hz to other rates");
 }
 
-void add_numbers(CLI::App& command, Precision& precision, bool& rescale) {
-  add_choice<Precision>(command, "--precision", precision,
-                        {{"double", Precision::float64}, {"float", Precision::float32}},
-                        "floating-point format");
+void add_numbers(CLI::App& command, std::optional<Precision>& precision, bool& rescale) {
+  command
+      .add_option_function<std::string>(
+          "--precision",
+          [&precision](const std::string& word) { precision = precision_named(word); },
+          "floating-point format: double, float (default: the preset's)")
+      ->check(CLI::IsMember({"double", "float"}).description(""))
+      ->type_name("WORD");
   add_no_rescale(command, rescale);
 }
 

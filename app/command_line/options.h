@@ -54,7 +54,7 @@ void add_force(CLI::App& command, bool& force);
 
 void add_no_rescale(CLI::App& command, bool& rescale);
 // Precision and rescaling.
-void add_numbers(CLI::App& command, Precision& precision, bool& rescale);
+void add_numbers(CLI::App& command, std::optional<Precision>& precision, bool& rescale);
 
 // Tuning, which overrides the preset.
 void add_keys(CLI::App& command, KeyOptions& keys);

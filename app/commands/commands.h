@@ -24,9 +24,9 @@ struct PlayOptions {
   AudioOptions device;
   double gain_db = 0.0;
   int voices = 0;
-  int threads = 1;        // including the audio thread
-  NoteShare::Part share;  // share of the notes
-  Precision precision = Precision::float64;
+  int threads = 1;                     // including the audio thread
+  NoteShare::Part share;               // share of the notes
+  std::optional<Precision> precision;  // empty: the preset's
   bool rescale = true;
   std::optional<Method> method;        // empty: the plan's choice
   std::optional<Budget> budget;        // empty: the preset's

@@ -29,7 +29,7 @@ struct RenderOptions {
   std::string phrase;                  // text of a score, instead of the default phrase
   std::vector<Setting> parameters;     // set before the first sample
   std::optional<SampleFormat> format;  // empty: the best that the format supports
-  Precision precision = Precision::float64;
+  std::optional<Precision> precision;  // empty: the preset's
   bool rescale = true;
   std::optional<Method> method;        // empty: the plan's choice
   std::optional<Budget> budget;        // empty: the preset's

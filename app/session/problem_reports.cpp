@@ -17,14 +17,14 @@ void ProblemReports::add_reset(const std::string& model, bool is_proved) {
   resets_.add(model + ": a voice was faded out, because " + reset_cause(is_proved));
 }
 
-void ProblemReports::add_overload(const Report& report) {
+void ProblemReports::add_overload(const Report& report, Precision precision) {
   overloads_.add("the load is " + std::to_string(std::lround(100.0 * report.value)) + " %" +
                  (report.index > 0 ? "; the quietest voices fade out, and at most " +
                                          counted(report.index, "voice sounds", "voices sound") +
                                          " until the load falls"
                                    : "") +
                  "; to lower the load, use a longer period, " +
-                 ways_to_lower_load(report.index, precision_));
+                 ways_to_lower_load(report.index, precision));
 }
 
 void ProblemReports::add_lost_events(const Meters& now) {

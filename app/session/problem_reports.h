@@ -18,19 +18,16 @@ std::string reset_cause(bool is_proved);
 // [worker]
 class ProblemReports {
  public:
-  explicit ProblemReports(Precision precision) : precision_(precision) {}
-
   // A voice of this model became unstable.
   void add_reset(const std::string& model, bool is_proved);
-  // The load is too high.
-  void add_overload(const Report& report);
+  // The load of a model with this precision is too high.
+  void add_overload(const Report& report, Precision precision);
   // Adds late and dropped events since the last call.
   void add_lost_events(const Meters& now);
   // Reports what is due.
   void report(const MessageHandler& on_message);
 
  private:
-  Precision precision_;
   RateLimit resets_;
   RateLimit overloads_{std::chrono::seconds(10)};
   RateLimit late_;

@@ -29,7 +29,7 @@ void measure(Plan& plan, const Engine& engine, const CompileOptions& options, in
              const Timings& timings) {
   auto part = plan.parts.begin();
   const Workload load{
-      .is_double = options.precision == Precision::float64, .isa = options.isa, .voices = voices};
+      .is_double = plan.precision == Precision::float64, .isa = options.isa, .voices = voices};
   for (const Program& program : engine.machine().parts) {
     if (program.moving > 0 && part != plan.parts.end()) {
       part->measured_ns = known_ns(program, load, timings).value_or(0.0);
@@ -68,7 +68,7 @@ std::string overload_warning(const Compiled& compiled, const CompileOptions& opt
          (fitting > 0  ? ": " + std::to_string(fitting) + " fit"
           : voices > 1 ? ", one alone " + percent(each)
                        : "") +
-         "; to lower the load, use " + ways_to_lower_load(fitting, options.precision);
+         "; to lower the load, use " + ways_to_lower_load(fitting, compiled.plan.precision);
 }
 
 std::string ways_to_lower_load(int voices, Precision precision) {

@@ -59,7 +59,6 @@ Worker::Worker(Process& process, const SessionOptions& options, MessageHandler o
       engines_(engines),
       watch_(watch),
       builder_(options, on_message_, queue, current, engines, watch),
-      problems_(options.compile.precision),
       thread_([this] { run(); }) {}
 
 Worker::~Worker() {
@@ -197,7 +196,7 @@ void Worker::read_reports() {
       problems_.add_reset(is_current ? loaded->name : "the last model",
                           is_current && loaded->instrument.verdict == Verdict::stable);
     } else if (report.kind == Report::Kind::overload && is_current) {
-      problems_.add_overload(report);
+      problems_.add_overload(report, loaded->plan.precision);
     } else if (report.kind == Report::Kind::program) {
       program = static_cast<int>(report.value);
     } else if (report.kind == Report::Kind::heard) {

@@ -97,6 +97,7 @@ Result<std::optional<Compiled>> compile_body(const CompileRequest& request, cons
   }
   CompileOptions options = request.options;
   options.voices = 1;
+  options.precision = request.precision;
   options.share = {};
   options.find_gain = false;
   const std::size_t before = std::min(forms_before, options.forms.size());

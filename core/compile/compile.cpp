@@ -76,7 +76,7 @@ Planned plan(const CompileRequest& request, const Analysis& analysis, const Proo
   const bool may_reach =
       analysis.shapes && !options.bare && proof.margins.keys > 0.0 && !has_waveguides;
   const Workload load{
-      .is_double = options.precision == Precision::float64,
+      .is_double = request.precision == Precision::float64,
       .isa = options.isa,
       .voices = request.voices,
       .highest_factor = stable,
@@ -207,7 +207,7 @@ Result<Compiled> compile_by_stages(const CompileRequest& request) {
   const TunedKeys keys = tune(request, network, *analysis, proof.margins, planned,
                               voice_curves(network, preset, proof.stability));
 
-  if (auto error = check_memory(planned.machine, request.voices, options.precision,
+  if (auto error = check_memory(planned.machine, request.voices, request.precision,
                                 options.executor, options.most_bytes)) {
     return *std::move(error);
   }
@@ -224,7 +224,7 @@ Result<Compiled> compile_by_stages(const CompileRequest& request) {
   if (options.find_gain) {
     progress.stage("finding its gain");
     factor =
-        find_gain(planned.machine, playing_with(1, 1.0), options.precision, options.isa, progress);
+        find_gain(planned.machine, playing_with(1, 1.0), request.precision, options.isa, progress);
   }
   const double gain = preset.gain * factor.value_or(1.0);
   // The voices move the body by their outputs as they are. The last body has the preset's gain.
@@ -241,10 +241,11 @@ Result<Compiled> compile_by_stages(const CompileRequest& request) {
   std::optional<Accuracy> accuracy = accuracy_of(planned.parts);
   Compiled compiled{
       .engine = make_engine(std::move(planned.machine), playing_with(request.voices, voice_gain),
-                            options.precision, options.isa, progress, options.executor),
+                            request.precision, options.isa, progress, options.executor),
       .instrument = std::move(instrument),
       .plan = {.parts = std::move(planned.parts),
                .budget = request.budget,
+               .precision = request.precision,
                .accuracy = std::move(accuracy),
                .notes = std::move(notes)},
       .stability = proof.stability,

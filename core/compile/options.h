@@ -23,7 +23,7 @@ struct CompileOptions {
   bool bare = false;      // the network as written: no smoothing and no sleep
   int voices = 0;         // replaces the preset's number; 0: the preset's
   NoteShare::Part share;  // share of the notes that this engine plays
-  Precision precision = Precision::float64;
+  std::optional<Precision> precision;        // replaces the preset's
   std::optional<Method> method;              // replaces the plan's choice
   std::optional<Budget> budget;              // replaces the preset's
   Isa isa = best_isa();                      // no wider than the machine's
@@ -45,6 +45,7 @@ struct CompileRequest {
   const Preset& preset;
   const CompileOptions& options;
   Budget budget = options.budget.value_or(preset.budget);
+  Precision precision = options.precision.value_or(preset.precision);
   double rate_ratio = rate_ratio_of(options.rate_hz, options.rescale);
   int voices = options.voices > 0 ? options.voices : preset.voices;
 

@@ -11,6 +11,7 @@
 #include "core/kernels/program.h"
 #include "core/kernels/registry.h"
 #include "core/model/preset/budget.h"
+#include "core/precision.h"
 #include "core/progress.h"
 
 namespace ressort::compile {
@@ -44,6 +45,7 @@ struct Part {
 struct Plan {
   std::vector<Part> parts;
   Budget budget;
+  Precision precision = Precision::float64;
   std::optional<Accuracy> accuracy;  // error of the worst part
   // notes on everything that is not computed as the model is written
   std::vector<std::string> notes;

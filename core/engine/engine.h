@@ -12,6 +12,7 @@
 #include "core/engine/readings.h"
 #include "core/kernels/isa.h"
 #include "core/kernels/program.h"
+#include "core/precision.h"
 #include "core/progress.h"
 
 namespace ressort::kernels {
@@ -19,8 +20,6 @@ class Executor;
 }
 
 namespace ressort::engine {
-
-enum class Precision : std::uint8_t { float32, float64 };
 
 // A parameter of the body that follows a parameter of the voices.
 struct SharedParameter {

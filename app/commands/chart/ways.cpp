@@ -61,10 +61,6 @@ void add_truncation(std::vector<Way>& ways, const std::string& line, std::option
 
 }  // namespace
 
-const char* precision_name(Precision precision) {
-  return precision == Precision::float64 ? "double" : "float";
-}
-
 std::vector<Way> all_ways() {
   std::vector<Way> ways;
   for (const Method method : all_methods()) {

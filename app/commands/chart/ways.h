@@ -24,7 +24,6 @@ struct Way {
 };
 
 std::vector<Way> all_ways();
-const char* precision_name(Precision precision);
 
 // A scene compiled for one way, ready to play.
 struct MadeWay {

@@ -37,7 +37,7 @@ struct FlightSetup {
   bool rescale = true;
   int voices = 0;
   NoteShare::Part share;  // the part of the notes that was played; all notes are recorded
-  Precision precision = Precision::float64;
+  std::optional<Precision> precision;
   std::optional<Method> method;
   std::optional<Budget> budget;
   std::optional<ThirdArgument> third;

@@ -35,9 +35,6 @@ constexpr KindName event_names[] = {
     {EventKind::panic, "panic"},
 };
 
-constexpr std::pair<Precision, std::string_view> precisions[] = {{Precision::float32, "float"},
-                                                                 {Precision::float64, "double"}};
-
 template <class Rows, class Value>
 std::string name_in(const Rows& rows, Value value) {
   for (const auto& [known, name] : rows) {
@@ -91,7 +88,9 @@ void print(FlightWriter& out, const FlightSetup& setup) {
   if (setup.share.of > 1) {
     out.line("share", setup.share.number, setup.share.of);
   }
-  out.line("precision", name_in(precisions, setup.precision));
+  if (setup.precision) {
+    out.line("precision", precision_name(*setup.precision));
+  }
   if (setup.method) {
     out.line("method", method_name(*setup.method));
   }
@@ -230,11 +229,8 @@ class FlightReader {
       setup.share.of = words.whole<int>(NoteShare::most_parts);
       words.ok = words.ok && setup.share.number >= 1 && setup.share.number <= setup.share.of;
     } else if (key == "precision") {
-      const std::string_view name = words.word();
-      const auto* const row =
-          std::ranges::find_if(precisions, [&](const auto& known) { return known.second == name; });
-      words.ok = words.ok && row != std::end(precisions);
-      setup.precision = words.ok ? row->first : setup.precision;
+      setup.precision = precision_named(words.word());
+      words.ok = words.ok && setup.precision.has_value();
     } else if (key == "method") {
       setup.method = method_named(words.word());
       words.ok = setup.method.has_value();

@@ -808,6 +808,13 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
       reader.fail(*root.get("budget"), "'budget': " + parsed.error().message);
     }
   }
+  if (std::string precision; reader.text("precision", precision)) {
+    if (const auto named = precision_named(precision)) {
+      preset.precision = *named;
+    } else {
+      reader.fail(*root.get("precision"), "'precision' must be double or float");
+    }
+  }
   if (std::string tuning; reader.text("tuning", tuning)) {
     preset.keyboard = tuning == "keyboard";
     if (!preset.keyboard && tuning != "fixed") {

@@ -15,6 +15,7 @@
 #include "core/lfo.h"
 #include "core/model/network.h"
 #include "core/model/preset/budget.h"
+#include "core/precision.h"
 #include "core/result.h"
 
 namespace ressort::model {
@@ -151,6 +152,7 @@ struct Preset {
   double glide_s = 0.0;                     // glide time between notes
   std::optional<ThirdArgument> third;       // meaning of the state argument; overrides the model
   Budget budget;                            // error budget
+  Precision precision = Precision::float64;
   std::vector<ParameterSetting> parameters;
   std::vector<LfoSetting> lfos;
   std::vector<ControlSetting> controls;

@@ -30,6 +30,7 @@ constexpr PresetKey keys[] = {
     {"", "glide_s", "0 to 60 (0)", "glide time between notes; in legato only between overlapping notes"},
     {"", "motion", "`velocity` or `delayed`", "meaning of the last argument of a mass; overrides the model"},
     {"", "budget", "text", "accuracy, as for `--budget`: `cents=3 t60=5 silence=-60 passive=auto`"},
+    {"", "precision", "`double` or `float` (`double`)", "floating-point format of the voices and bodies; `--precision` replaces it"},
     {"", "parameters", "a table", "the model's parameters by name"},
     {"", "control", "tables, one for each `[[control]]`", "the sources that play the model"},
     {"", "lfo", "tables, one for each `[[lfo]]`", "up to 8 oscillators of every note"},

@@ -101,6 +101,23 @@ TEST_CASE("an undamped string at K = M repeats to the last bit", "[float]") {
   }
 }
 
+TEST_CASE("a preset plays in its own precision, unless another is asked for", "[float]") {
+  const std::string ringing =
+      "@m osc 1. 0.01 0.0001 0. 0.\n@in1 frcInput @m\n" + scenes::output(1, "m");
+  const auto played = [&](Precision of_preset, std::optional<Precision> asked) {
+    Preset preset = support::struck(1);
+    preset.precision = of_preset;
+    support::Player player(ringing, preset, {.precision = asked});
+    player.run(4410, {support::note_on(0, 60)});
+    return player.y();
+  };
+  const auto exact = played(Precision::float64, {});
+  const auto rounded = played(Precision::float32, {});
+  CHECK(exact != rounded);
+  CHECK(played(Precision::float32, Precision::float64) == exact);
+  CHECK(played(Precision::float64, Precision::float32) == rounded);
+}
+
 // Denormal forces are flushed to 0, so the mass keeps swinging at the smallest normal numbers, 680
 // dB below 1. No denormal number slows down the computation.
 TEST_CASE("a decayed signal contains no denormals if these are flushed", "[float]") {

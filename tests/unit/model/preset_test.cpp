@@ -303,6 +303,7 @@ TEST_CASE("errors in presets have a line and a column", "[preset]") {
        "'round_robin' is for notes only"},
       {m + "noise = 1", 2, 9, "'noise' must be true or false"},
       {m + "tuning = \"odd\"", 2, 10, "'tuning' must be keyboard or fixed"},
+      {m + "precision = \"single\"", 2, 13, "'precision' must be double or float"},
       {m + "transpose = 97", 2, 13, "'transpose' must lie between -96 and 96"},
       {"model = 7", 1, 9, "'model' must be a text in quotes"},
       {m + "parameters = 3", 2, 14, "'parameters' must be a table"},

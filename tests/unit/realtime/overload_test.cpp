@@ -308,9 +308,10 @@ TEST_CASE("the warning about a plan too large for one core says how many voices 
   const auto warning = [](double share, int voices, double rate_hz, Precision precision) {
     Compiled compiled;
     compiled.instrument.voices = voices;
+    compiled.plan.precision = precision;
     compiled.plan.parts.push_back({.estimated_ns = 0.25 * share * 1e9 / 48000.0});
     compiled.plan.parts.push_back({.estimated_ns = 0.75 * share * 1e9 / 48000.0});
-    return overload_warning(compiled, {.rate_hz = rate_hz, .precision = precision}, {});
+    return overload_warning(compiled, {.rate_hz = rate_hz}, {});
   };
   CHECK(warning(1.75, 64, 48000.0, Precision::float64) ==
         "all 64 voices would take about 175 % of one core: 32 fit; to lower the load, use -p 32, a "
