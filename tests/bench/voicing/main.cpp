@@ -6,6 +6,7 @@
 //  ressort_voicing --played N [PRESET...]              processor time as played, median of N
 //  ressort_voicing --restrikes KEY [PRESET...]         level of a ringing note after a soft strike
 //  ressort_voicing --mono RATE [PRESET...]             level of a change of keys in mono mode
+//  ressort_voicing --rounding RATE [PRESET...]         errors of single precision
 //  ressort_voicing --tuner RATE [PRESET...]            pitch of every semitone by YIN
 //  ressort_voicing [--seconds S] FILE.mid... [PRESET...]
 //                                                      MIDI files, each to its end or for S seconds
@@ -34,6 +35,7 @@
 #include "tests/bench/voicing/player.h"
 #include "tests/bench/voicing/random_settings.h"
 #include "tests/bench/voicing/restrikes.h"
+#include "tests/bench/voicing/rounding.h"
 #include "tests/bench/voicing/sound.h"
 #include "tests/bench/voicing/tuner.h"
 
@@ -370,6 +372,7 @@ int run(int argc, char** argv) {
   int played = 0;
   double tuner_hz = 0.0;
   double mono_hz = 0.0;
+  double rounding_hz = 0.0;
   std::uint64_t seed = 1;
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
@@ -387,6 +390,8 @@ int run(int argc, char** argv) {
       restrikes = std::atoi(argv[++i]);
     } else if (word == "--mono") {
       mono_hz = std::atof(argv[++i]);
+    } else if (word == "--rounding") {
+      rounding_hz = std::atof(argv[++i]);
     } else if (word == "--played") {
       played = std::max(1, std::atoi(argv[++i]));
     } else if (word == "--tuner") {
@@ -413,7 +418,8 @@ int run(int argc, char** argv) {
   }
   if (!files.empty()) {
     print_midi_head();
-  } else if (random == 0 && bows == 0 && restrikes == 0 && mono_hz == 0.0 && tuner_hz == 0.0) {
+  } else if (random == 0 && bows == 0 && restrikes == 0 && mono_hz == 0.0 && tuner_hz == 0.0 &&
+             rounding_hz == 0.0) {
     return print_table(names, step) == 0 ? 0 : 1;
   }
   int failures = 0;
@@ -429,6 +435,8 @@ int run(int argc, char** argv) {
       } else if (mono_hz > 0.0) {
         Player player(name, mono_hz);
         failures += check_mono(player, name);
+      } else if (rounding_hz > 0.0) {
+        failures += check_rounding(name, rounding_hz);
       } else if (tuner_hz > 0.0) {
         Player player(name, tuner_hz, false);
         failures += check_semitones(player, name);

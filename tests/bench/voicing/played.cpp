@@ -138,13 +138,13 @@ class FaustPeers {
 int print_played(const std::vector<std::string>& names, int turns) {
   std::printf(
       "| %% of a core | voices | idle | one | all | re-struck | low keys | high keys "
-      "| float, all | predicted | FAUST, all |\n"
+      "| double, all | predicted | FAUST, all |\n"
       "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n");
   int failures = 0;
   for (const std::string& name : names) {
     try {
       Player player(name, played_rate_hz);
-      Player in_float(name, played_rate_hz, true, Precision::float32);
+      Player in_double(name, played_rate_hz, true, Precision::float64);
       const int voices = player.instrument().voices;
       const std::vector<TimedEvent> all = chord(voices);
       const std::array<std::vector<TimedEvent>, 6> played = {
@@ -163,7 +163,7 @@ int print_played(const std::vector<std::string>& names, int turns) {
         for (std::size_t i = 0; i < played.size(); ++i) {
           shares[i].push_back(player.processor_share(played[i], played_s));
         }
-        shares.back().push_back(in_float.processor_share(all, played_s));
+        shares.back().push_back(in_double.processor_share(all, played_s));
         if (faust) {
           faust->measure();
         }

@@ -22,7 +22,7 @@ Scene scene_of(const std::string& name, bool with_lfos) {
   return *std::move(scene);
 }
 
-Compiled compiled_of(const Scene& scene, double rate_hz, Precision precision) {
+Compiled compiled_of(const Scene& scene, double rate_hz, std::optional<Precision> precision) {
   std::vector<std::string> warnings;
   auto compiled = compile_scene(scene, {.rate_hz = rate_hz, .precision = precision}, warnings);
   if (!compiled) {
@@ -65,7 +65,8 @@ std::vector<TimedEvent> chord(int voices) {
   return voices <= 16 ? chord(voices, 48, 2) : chord(voices, 28, 1);
 }
 
-Player::Player(const std::string& name, double rate_hz, bool with_lfos, Precision precision)
+Player::Player(const std::string& name, double rate_hz, bool with_lfos,
+               std::optional<Precision> precision)
     : scene_(scene_of(name, with_lfos)),
       compiled_(compiled_of(scene_, rate_hz, precision)),
       rate_hz_(rate_hz),

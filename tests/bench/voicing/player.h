@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,9 +32,10 @@ std::vector<TimedEvent> chord(int voices);
 
 class Player {
  public:
-  // Throws std::runtime_error with all errors. Without LFOs, a bow plays without vibrato.
+  // Throws std::runtime_error with all errors. Without LFOs, a bow plays without vibrato. Without a
+  // precision it is the preset's.
   Player(const std::string& name, double rate_hz, bool with_lfos = true,
-         Precision precision = Precision::float64);
+         std::optional<Precision> precision = {});
 
   // Plays from silence, with the parameters of the preset and without input signals. The events are
   // sorted by time.
