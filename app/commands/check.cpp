@@ -214,6 +214,7 @@ json scene_json(const Scene& scene, const Compiled& compiled, const Proved& prov
            {"outputs", instrument.outputs},
            {"parameters", parameters},
            {"plan", plan},
+           {"precision", precision_name(compiled.plan.precision)},
            {"stability", stability_json(proved)},
            {"stiffness_margin", instrument.stiffness_margin}};
   if (compiled.plan.accuracy) {

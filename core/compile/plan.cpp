@@ -517,6 +517,9 @@ std::string describe(const std::vector<Part>& parts) {
 
 std::string describe(const Plan& plan) {
   std::string text = describe(plan.parts);
+  if (plan.precision == Precision::float32) {
+    text += "in single precision\n";
+  }
   for (const std::string& note : plan.notes) {
     text += note + "\n";
   }

@@ -108,6 +108,9 @@ TEST_CASE("a preset plays in its own precision, unless another is asked for", "[
     Preset preset = support::struck(1);
     preset.precision = of_preset;
     support::Player player(ringing, preset, {.precision = asked});
+    const bool is_told =
+        describe(player.compiled.plan).find("in single precision") != std::string::npos;
+    CHECK(is_told == (asked.value_or(of_preset) == Precision::float32));
     player.run(4410, {support::note_on(0, 60)});
     return player.y();
   };
