@@ -40,6 +40,9 @@ struct VoiceCurve {
   double keys_at = 0.0;              // the knob's value at which `keys` holds as written
   double lowest = 0.0;               // range of the knob and of all values
   double highest = 0.0;
+  // True if only links of thrown masses, such as hammers, depend on the parameter. A voice that
+  // moves to another key without a strike then keeps the parameter's value on the struck key.
+  bool is_of_blow = false;
 
   // The knob and the velocity are factors if the range is above 0, and the logarithm of the values
   // is interpolated. They are offsets in any other range.

@@ -104,7 +104,7 @@ Press Keyboard::press_key(int key, double velocity, std::uint8_t channel, double
                                                        : mono->is_undamped() || mono->held);
   if (sounds_on) {
     voices.set_latest(*mono);
-    attach(*mono, key, channel);
+    attach(*mono, key, channel, is_struck);
     replace_other_keys(key, channel);
     move_to(*mono, key, own_hz, glides, highest_factor);
     return is_struck ? Press::strikes : Press::moves;
@@ -116,7 +116,7 @@ Press Keyboard::press_key(int key, double velocity, std::uint8_t channel, double
   Voice* const kept = is_fixed ? nullptr : replace_voices_of(key, channel, velocity);
   if (kept != nullptr && !rings_on_) {
     voices.set_latest(*kept);
-    attach(*kept, key, channel);
+    attach(*kept, key, channel, false);
     return Press::moves;
   }
   Voice& latest = voices[voices.latest()];
@@ -124,7 +124,7 @@ Press Keyboard::press_key(int key, double velocity, std::uint8_t channel, double
   Voice& voice = stays ? latest : voices.take_lane();
   voices.set_latest(voice);
   if (is_fixed && voice.is_live()) {
-    attach(voice, key, channel);
+    attach(voice, key, channel, true);
     return Press::strikes;
   }
   start_voice(key, channel, {.hz = hz, .key_hz = note_hz, .is_own = own_hz > 0.0}, glides);
@@ -140,7 +140,7 @@ void Keyboard::start_voice(int key, std::uint8_t channel, const Pitch& pitch, bo
   voices.start(voices.latest(), pitch.hz, channels_.semitones(0));
   voice.key_hz = pitch.key_hz;
   voice.has_own_pitch = pitch.is_own;
-  attach(voice, key, channel);
+  attach(voice, key, channel, true);
   voice.volume = level_of(voice);
   double& before_hz = last_hz_[channel % Channels::count];
   if (glides && before_hz > 0.0 && pitch.hz > 0.0) {
@@ -149,10 +149,11 @@ void Keyboard::start_voice(int key, std::uint8_t channel, const Pitch& pitch, bo
   before_hz = pitch.hz;
 }
 
-// From now on the voice is held by this key of this channel.
-void Keyboard::attach(Voice& voice, int key, std::uint8_t channel) {
+// From now on the voice is held by this key of this channel. `is_struck`: the key also strikes it.
+void Keyboard::attach(Voice& voice, int key, std::uint8_t channel, bool is_struck) {
   voice.has_key = true;
   voice.key = static_cast<std::uint8_t>(key);
+  voice.struck_key = is_struck ? voice.key : voice.struck_key;
   if (!playing_.curves.empty()) {
     voices.mark_retuned(voice);
   }
@@ -203,7 +204,7 @@ std::optional<ReturnedKey> Keyboard::return_to_held_key(int key, std::uint8_t ch
     return ReturnedKey{*earlier, Press::starts};
   }
   voices.set_latest(*voice);
-  attach(*voice, earlier->key, channel);
+  attach(*voice, earlier->key, channel, is_struck);
   replace_other_keys(earlier->key, channel);
   move_to(*voice, earlier->key, earlier->frequency_hz, true, highest_factor);
   return ReturnedKey{*earlier, is_struck ? Press::strikes : Press::moves};

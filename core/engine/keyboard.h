@@ -149,7 +149,7 @@ class Keyboard {
   };
 
   void start_voice(int key, std::uint8_t channel, const Pitch& pitch, bool glides);
-  void attach(Voice& voice, int key, std::uint8_t channel);
+  void attach(Voice& voice, int key, std::uint8_t channel, bool is_struck);
   Voice* latest_on(std::uint8_t channel);
   void hold(Voice& voice) const;
   Voice* replace_voices_of(int key, std::uint8_t channel, double velocity);

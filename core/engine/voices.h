@@ -68,6 +68,7 @@ struct alignas(64) Voice {
   bool is_released = false;  // its key has been released
   bool is_replaced = false;  // another voice has taken its key or its channel
   std::uint8_t key = 0;
+  std::uint8_t struck_key = 0;  // key of its last strike
   std::uint8_t channel = 0;
   bool has_own_pitch = false;  // given by the note, not by the key
   Decay decay;
@@ -108,7 +109,8 @@ inline double value_in_voice(const Playing& playing, std::size_t parameter, doub
       playing.tuning == Tuning::keyboard && voice.has_key ? playing.curve_of(parameter) : nullptr;
   constexpr double highest_velocity = 127.0;
   return curve == nullptr ? shared
-                          : curve->at(voice.key, highest_velocity * voice.velocity, shared);
+                          : curve->at(curve->is_of_blow ? voice.struck_key : voice.key,
+                                      highest_velocity * voice.velocity, shared);
 }
 
 // All functions but the constructor: [audio] wait-free, O(voices).

@@ -198,6 +198,19 @@ TEST_CASE("in mono a pedal holds the sound, and keys set its pitch", "[play_mode
   CHECK(keys.sounding() == 0);
 }
 
+TEST_CASE("a legato voice keeps the key that was struck", "[play_modes]") {
+  const bool legato = GENERATE(false, true);
+  Keys keys(8, true, legato);
+  keys.on(45);
+  REQUIRE(keys.latest().struck_key == 45);
+  keys.on(46);
+  CHECK(keys.latest().key == 46);
+  CHECK(keys.latest().struck_key == (legato ? 45 : 46));
+  keys.off(46);
+  CHECK(keys.latest().key == 45);
+  CHECK(keys.latest().struck_key == 45);
+}
+
 TEST_CASE("legato moves without a new blow while a key is down", "[play_modes]") {
   Keys keys(8, true, true);
   CHECK(keys.on(60) == Press::starts);
