@@ -36,8 +36,8 @@ int check_rounding(const std::string& name, double rate_hz) {
   double worst_db = -1e9;
   for (const int key : {36, 60, 84}) {
     const std::vector<TimedEvent> note = {{0.0, note_on(key, 100)}};
-    worst_db = std::max(
-        worst_db, greatest_difference_db(exact.play(note, sounding_s), rounded.play(note, sounding_s)));
+    worst_db = std::max(worst_db, greatest_difference_db(exact.play(note, sounding_s),
+                                                         rounded.play(note, sounding_s)));
   }
   const bool is_wrong = worst_db > most_difference_db;
   std::printf("%s: %.1f dB%s\n", name.c_str(), worst_db, is_wrong ? " !" : "");
