@@ -135,13 +135,7 @@ class alignas(64) InputDriver {
   template <class T>
   void fill_forces(std::size_t frames, std::size_t step, T* force) {
     for_parts(frames, [&](std::size_t first, std::size_t end, const double* pulses) {
-      std::size_t n = first;
-      if (motion_ != Motion::follow && held_frames_ == 0 && pulses != nullptr) {
-        for (const double value = value_; n < end; ++n) {
-          force[n * step] = static_cast<T>(value + pulses[n - first]);
-        }
-      }
-      for (; n < end; ++n) {
+      for (std::size_t n = first; n < end; ++n) {
         if (motion_ == Motion::follow) {
           approach();
         }

@@ -307,18 +307,6 @@ std::optional<std::size_t> find_hardness(const Network& network, const Preset& p
   return found < 0 ? std::nullopt : std::optional(static_cast<std::size_t>(found));
 }
 
-std::vector<bool> find_used_parameters(const Network& network) {
-  std::vector<bool> is_used(network.parameters.size());
-  for (const Formula& argument : network.arguments) {
-    for (const Step& step : argument) {
-      if (step.op == Op::parameter) {
-        is_used[step.index] = true;
-      }
-    }
-  }
-  return is_used;
-}
-
 // Marks the curves of parameters on which only links of thrown masses depend. These links must not
 // change while the note sounds: a gap that closes on a displaced string adds energy. O(network)
 void mark_curves_of_blows(const Network& network, const std::vector<Control>& controls,
@@ -335,7 +323,7 @@ void mark_curves_of_blows(const Network& network, const std::vector<Control>& co
   Network rest = network;
   std::erase_if(rest.links,
                 [&](const Link& link) { return is_thrown_mass[link.a] || is_thrown_mass[link.b]; });
-  const std::vector<bool> is_used = find_used_parameters(canonical(std::move(rest)));
+  const std::vector<bool> is_used = used_parameters(canonical(std::move(rest)));
   for (std::size_t i = 0; i < curves.size(); ++i) {
     if (curves[i]) {
       curves[i]->is_of_blow = !is_used[i];
@@ -347,7 +335,7 @@ void mark_curves_of_blows(const Network& network, const std::vector<Control>& co
 
 Playing make_playing(const Network& network, const Preset& preset, const Proof& proof,
                      const TunedKeys& keys, bool bare, int voices, double gain) {
-  const std::vector<Control> controls = make_controls(network, preset);
+  std::vector<Control> controls = make_controls(network, preset);
   auto curves = voice_curves(network, preset, proof.stability);
   mark_curves_of_blows(network, controls, curves);
   // The range of a curve bounds its knob, too, so that no voice leaves the proved box.
@@ -381,7 +369,7 @@ Playing make_playing(const Network& network, const Preset& preset, const Proof& 
       .highest_factor = keys.highest_factor,
       .home = proof.margins.home,
       .away = keys.away,
-      .controls = controls,
+      .controls = std::move(controls),
       .lfos = make_lfos(preset),
       .variation = {.strength = preset.varied_strength, .timing_s = preset.varied_ms / 1e3},
       .limits = std::move(limits),

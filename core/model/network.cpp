@@ -240,4 +240,16 @@ int output_count(const Network& network) {
   return count;
 }
 
+std::vector<bool> used_parameters(const Network& network) {
+  std::vector<bool> used(network.parameters.size(), false);
+  for (const Formula& formula : network.arguments) {
+    for (const Step& step : formula) {
+      if (step.op == Op::parameter) {
+        used[step.index] = true;
+      }
+    }
+  }
+  return used;
+}
+
 }  // namespace ressort::model

@@ -247,6 +247,9 @@ struct Network {
 // removed. O(n) in time and memory. [any thread but audio]
 Network canonical(Network network);
 
+// Returns which parameters an argument depends on: [parameter].
+std::vector<bool> used_parameters(const Network& network);
+
 // Returns an argument's value with these parameters; 0 for no_argument.
 double argument_value(const Network& network, ArgumentId argument,
                       std::span<const double> parameters);

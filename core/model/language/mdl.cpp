@@ -433,14 +433,7 @@ void Reader::warn_of_mistakes() {
   }
   warn_of_gaps(heard, "in");
   warn_of_gaps(network.outputs, "out");
-  std::vector<bool> used(network.parameters.size(), false);
-  for (const Formula& formula : network.arguments) {
-    for (const Step& step : formula) {
-      if (step.op == Op::parameter) {
-        used[step.index] = true;
-      }
-    }
-  }
+  const std::vector<bool> used = used_parameters(network);
   for (std::size_t i = 0; i < used.size(); ++i) {
     if (!used[i]) {
       const Parameter& parameter = network.parameters[i];
