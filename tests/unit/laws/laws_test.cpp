@@ -359,7 +359,7 @@ TEST_CASE("the slope of every gradient is that of its value", "[laws]") {
 TEST_CASE("the force of a felt solves its equation to rounding", "[laws]") {
   // f = (P(after) - P(before))/step with after = free - gamma f. Each energy has about 4 roundings
   // of u = 2^-53, which the division by the step magnifies. Each depth has 2, which the slope turns
-  // into a force. Newton's method stops after a step of 2^-34 and one more, whose error is below
+  // into a force. Newton's method stops after a step of 2^-34, whose tangent errs by less than
   // these. Twice these figures, for the solver and for this check.
   Random random(7);
   constexpr double u = 0x1p-53;
@@ -396,6 +396,30 @@ TEST_CASE("the force of a felt solves its equation to rounding", "[laws]") {
     touching += f > 0.0;
   }
   CHECK(touching > draws / 4);
+}
+
+TEST_CASE("the friction of a smooth bow solves its equation to rounding", "[laws]") {
+  // f = 0.63 Z v exp(1/2 - 4 r^2) with r = v/s and v = wanted - half f. With u = 2^-53, the
+  // exponent's 4 roundings change f by 4 r^2 u each, the 5 of the product by u each, and those of v
+  // by the slope times u. Twice these figures, for the solver and for this check.
+  Random random(11);
+  constexpr double u = 0x1p-53;
+  for (int i = 0; i < 10 * draws; ++i) {
+    const laws::SmoothBow<double> bow{.z = random.uniform(0.01, 2.0),
+                                      .s = random.uniform(0.01, 1.0)};
+    const double half = random.uniform(0.0, 1.5);
+    const double last = random.uniform(-0.5, 0.5);
+    const double wanted = random.uniform(-1.0, 1.0);
+    const double f = bow.grip(wanted, last, half);
+    const double v = wanted - half * f;
+    const double ratio = v / bow.s;
+    const double grip = 0.63 * bow.z * std::exp(0.5 - 4.0 * ratio * ratio);
+    const double slope = std::fabs(grip * (1.0 - 8.0 * ratio * ratio));
+    const double rounding = u * (std::fabs(f) * (16.0 * ratio * ratio + 5.0) +
+                                 slope * (std::fabs(wanted) + std::fabs(v)));
+    CAPTURE(bow.z, bow.s, half, last, wanted, f);
+    CHECK(std::fabs(f - grip * v) <= 2.0 * rounding);
+  }
 }
 
 TEST_CASE("every law has a finite force if some of its arguments are 0", "[laws]") {
